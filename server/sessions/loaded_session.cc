@@ -146,7 +146,7 @@ absl::Status LoadedSession::BeginAnew(RunCuts cuts, const EstimatorSnapshot& sna
   if (!snapshot.state.empty()) anew.estimator->Restore(snapshot, stop).IgnoreError();
   POLYEST_RETURN_IF_ERROR(stop.Check());
   computed_ = std::move(anew);
-  half_given_ = false;
+  in_doubt_ = false;
   latest_ = nullptr;
   return absl::OkStatus();
 }
@@ -165,14 +165,28 @@ int64_t LoadedSession::memory_bytes() const {
 }
 
 absl::Status LoadedSession::Store(int64_t sequence) {
-  POLYEST_RETURN_IF_ERROR(GiveUpTo(sequence, Stop()));
+  POLYEST_RETURN_IF_ERROR(GiveUpTo(sequence));
   Release(sequence);
   return absl::OkStatus();
 }
 
+template <typename Function>
+std::invoke_result_t<Function> LoadedSession::AllOrDoubt(const Function& work) {
+  in_doubt_ = true;
+  std::invoke_result_t<Function> result = work();
+  in_doubt_ = false;
+  return result;
+}
+
+absl::Status LoadedSession::Renew(const Stop& stop) {
+  return BeginAnew(computed_.cuts, Snapshot().second, stop);
+}
+
 absl::Status LoadedSession::ProcessUpTo(int64_t sequence, const Stop& stop) {
-  POLYEST_RETURN_IF_ERROR(GiveUpTo(sequence, stop));
-  return computed_.estimator->Process(stop);
+  return AllOrDoubt([&]() -> absl::Status {
+    POLYEST_RETURN_IF_ERROR(GiveUpTo(sequence));
+    return computed_.estimator->Process(stop);
+  });
 }
 
 // Where the numerics fail twice after the same number of rows, the cause is not the row that
@@ -193,20 +207,15 @@ absl::Status LoadedSession::EndFailedRun(const absl::Status& reason, const Stop&
 }
 
 absl::Status LoadedSession::WithEstimator(const Work& work) {
-  POLYEST_RETURN_IF_ERROR(GiveUpTo(std::numeric_limits<int64_t>::max(), Stop()));
-  return work(*computed_.estimator, computed_.sequence);
+  return AllOrDoubt([&]() -> absl::Status {
+    POLYEST_RETURN_IF_ERROR(GiveUpTo(std::numeric_limits<int64_t>::max()));
+    return work(*computed_.estimator, computed_.sequence);
+  });
 }
 
-// A lack of memory may throw while a batch is given. How much of it the estimator has then is not
-// known, so the estimator is made anew before the same batch is given again.
-absl::Status LoadedSession::GiveUpTo(int64_t sequence, const Stop& stop) {
-  if (half_given_) {
-    POLYEST_RETURN_IF_ERROR(BeginAnew(computed_.cuts, Snapshot().second, stop));
-  }
+absl::Status LoadedSession::GiveUpTo(int64_t sequence) {
   while (const TakenBatch* const batch = intake_.Oldest(sequence)) {
-    half_given_ = true;
     POLYEST_RETURN_IF_ERROR(Give(*batch, computed_));
-    half_given_ = false;
     intake_.RemoveOldest();
   }
   return absl::OkStatus();
@@ -227,7 +236,8 @@ absl::Status LoadedSession::Give(const TakenBatch& batch, Computed& computed) {
 
 absl::StatusOr<SharedEstimate> LoadedSession::CurrentEstimate(const Stop& stop) {
   if (latest_ != nullptr && latest_->sequence() == computed_.sequence) return latest_;
-  absl::StatusOr<Estimate> estimate = computed_.estimator->CurrentEstimate(stop);
+  absl::StatusOr<Estimate> estimate =
+      AllOrDoubt([&] { return computed_.estimator->CurrentEstimate(stop); });
   if (absl::IsFailedPrecondition(estimate.status())) {
     estimate = PriorEstimate(estimate.status(), stop);
   }

@@ -9,6 +9,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <type_traits>
 #include <utility>
 
 #include "core/external/model_library.h"
@@ -72,6 +73,11 @@ class LoadedSession {
 
   // The following are for one thread at a time.
 
+  // Whether an exception, such as a lack of memory, has ended one of the calls below, so that what
+  // is computed may be half done. None of them may be called again until Renew has computed it anew
+  // from the batches, all of which the journal must keep. Renew waits for the disk.
+  bool in_doubt() const { return in_doubt_; }
+  absl::Status Renew(const Stop& stop);
   // Returns the seconds of measurements that the estimator has, over all runs.
   double measured_s() const { return computed_.measured_s; }
   // Returns the number of the last batch that the estimator has.
@@ -123,7 +129,10 @@ class LoadedSession {
   absl::Status BeginAnew(RunCuts cuts, const EstimatorSnapshot& snapshot, const Stop& stop);
   // Takes the journal's snapshot and the cuts before it; nothing if it has none that is readable.
   std::pair<RunCuts, EstimatorSnapshot> Snapshot() const;
-  absl::Status GiveUpTo(int64_t sequence, const Stop& stop);
+  absl::Status GiveUpTo(int64_t sequence);
+  // Returns what `work` returns, and leaves what is computed in doubt if it throws.
+  template <typename Function>
+  std::invoke_result_t<Function> AllOrDoubt(const Function& work);
   static absl::Status Give(const TakenBatch& batch, Computed& computed);
   absl::StatusOr<Estimate> PriorEstimate(const absl::Status& reason, const Stop& stop) const;
 
@@ -136,7 +145,7 @@ class LoadedSession {
   int64_t number_ = 0;                       // of the session in the journal
   std::function<void(EstimatorSnapshot)> save_;
   int64_t failed_rows_ = -1;  // rows processed when EndFailedRun was called last
-  bool half_given_ = false;   // whether the estimator may have a part of the intake's oldest batch
+  bool in_doubt_ = false;
   SharedEstimate latest_;
 };
 

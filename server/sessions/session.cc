@@ -89,10 +89,6 @@ std::optional<Session::Clock::duration> Session::IdleTime() const {
   return activity_.idle();
 }
 
-void Session::ReleaseWriter(const SessionObserver* writer) {
-  if (writer_.Release(writer)) activity_.OnUsed();
-}
-
 void Session::Close() {
   closing_.request_stop();
   for (const auto& observer : observers_.Close()) observer->OnClosed();
@@ -151,6 +147,10 @@ absl::StatusOr<std::shared_ptr<LoadedSession>> Session::Loaded(const Stop& stop)
   const uint64_t losses = ledger_.losses();
   const InMemory present = Present();
   if (present.loaded != nullptr && present.losses == losses) {
+    if (present.loaded->in_doubt()) {
+      POLYEST_RETURN_IF_ERROR(AwaitKept(*present.loaded));
+      POLYEST_RETURN_IF_ERROR(present.loaded->Renew(stop));
+    }
     present.loaded->Release(ledger_.kept().sequence);
     return present.loaded;
   }

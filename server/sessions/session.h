@@ -108,7 +108,9 @@ class Session : public std::enable_shared_from_this<Session> {
     return writer_.Claim(std::move(writer), id);
   }
   // Takes the lease back from a writer, if it holds the lease.
-  void ReleaseWriter(const SessionObserver* writer);
+  void ReleaseWriter(const SessionObserver* writer) {
+    if (writer_.Release(writer)) activity_.OnUsed();
+  }
 
   // Goes on to the place that a journal shared with other daemons has told, if that is a later one
   // and this daemon does not own the session. The caller counts what is stored.

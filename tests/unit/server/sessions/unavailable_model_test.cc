@@ -1,9 +1,11 @@
-// Tests that a session keeps what it has computed while its model cannot be asked.
+// Tests that a session keeps what it has computed while its model cannot be asked, and computes
+// anew what an exception has left half done.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <new>
 
 #include "core/common/check.h"
 #include "core/propagation/trajectory_ensemble.h"
@@ -138,6 +140,23 @@ TEST_F(UnavailableModelTest, CostsNoRowAndTheEstimateGoesOnOnceItIsBack) {
     EXPECT_EQ(back.parameters(0).SerializeAsString(),
               undisturbed.parameters(0).SerializeAsString());
   }
+}
+
+TEST_F(UnavailableModelTest, LeavesNothingHalfDoneByAnException) {
+  Add(1, 1, 20);
+  CurrentEstimate();
+  const auto half_done = [](Estimator& estimator, int64_t) -> absl::Status {
+    Samples row;
+    row.time_s = {0.3};
+    row.columns = {{.name = "y", .value = {5}, .missing = {}}};
+    EXPECT_TRUE(estimator.Append(row).ok());
+    throw std::bad_alloc();
+  };
+  EXPECT_THROW(session_->WithEstimator(half_done, {}).IgnoreError(), std::bad_alloc);
+  Add(2, 21, 1);
+  const v1::Estimate after = CurrentEstimate();
+  EXPECT_EQ(after.samples(), 21);
+  EXPECT_NEAR(after.parameters(0).mean(), 3, 0.01);
 }
 
 }  // namespace
