@@ -19,12 +19,13 @@ struct Spelling {
 
 // Spellings in files of measurements that are not units of their own.
 constexpr Spelling kSpellings[] = {
-    {"-", "1"},         {"sec", "s"},       {"secs", "s"},        {"second", "s"},
-    {"seconds", "s"},   {"Sekunden", "s"},  {"msec", "ms"},       {"milliseconds", "ms"},
-    {"usec", "us"},     {"degree", "deg"},  {"degrees", "deg"},   {"Grad", "deg"},
-    {"U/min", "1/min"}, {"kph", "km/h"},    {"deg/sec", "deg/s"}, {"Grad/s", "deg/s"},
-    {"s-1", "1/s"},     {"min-1", "1/min"}, {"s⁻¹", "1/s"},       {"min⁻¹", "1/min"},
-    {"Nm", "N m"},      {"kNm", "kN m"},    {"Nmm", "N mm"},      {"Ns/m", "N s/m"},
+    {"-", "1"},          {"sec", "s"},      {"secs", "s"},      {"second", "s"},
+    {"seconds", "s"},    {"Sekunden", "s"}, {"msec", "ms"},     {"milliseconds", "ms"},
+    {"usec", "us"},      {"degree", "deg"}, {"degrees", "deg"}, {"Grad", "deg"},
+    {"U/min", "1/min"},  {"kph", "km/h"},   {"kmh", "km/h"},    {"deg/sec", "deg/s"},
+    {"Grad/s", "deg/s"}, {"s-1", "1/s"},    {"min-1", "1/min"}, {"s⁻¹", "1/s"},
+    {"min⁻¹", "1/min"},  {"Nm", "N m"},     {"kNm", "kN m"},    {"Nmm", "N mm"},
+    {"Ns/m", "N s/m"},
 };
 
 // Spellings of accelerations in standard gravity, which are masses otherwise.

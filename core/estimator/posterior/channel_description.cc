@@ -48,7 +48,10 @@ void DescribeSums(const AssessmentRequest& request, const Vector& eta, const Vec
   const double of_all = sums.samples.ChiSquared(d) / static_cast<double>(sums.samples.count());
   const double ratio = blocks.MeanSquare(delta) / of_all;
   if (!(ratio > 1 / kAlike && ratio < kAlike)) return;
-  channel.variance_ratio = blocks.VarianceRatio(delta);
+  // The error of the linearization lasts for many samples, and then counts in the sums as often as
+  // they are long.
+  const double at_most = ResidualBlocks::kLength * std::abs(ratio - 1);
+  channel.variance_ratio = std::max(0.0, ratio * blocks.VarianceRatio(delta) - at_most);
   channel.residual_sums = blocks.count();
 }
 

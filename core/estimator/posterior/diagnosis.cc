@@ -20,6 +20,10 @@ constexpr double kAtBound = 1e-6;  // fraction of the width of Ω
 constexpr double kNearBound = 1e-4;
 // Conflict of data and prior, in standard deviations, from which on chance hardly explains it.
 constexpr double kConflict = 4;
+// Posterior's standard deviation in that of the prior: from where on the data say nothing of a
+// bound, and up to where a posterior at a bound is one that would go on beyond it.
+constexpr double kAsWide = 0.9;
+constexpr double kPiledUp = 0.1;
 // Maximum ratio of the posterior's and the curvature's standard deviations, in either direction.
 constexpr double kGaussianRatio = 1.2;
 constexpr size_t kFailuresNamed = 3;
@@ -85,15 +89,24 @@ bool PriorAsksForBound(const Findings& findings, const Estimate& estimate, int i
          estimate.parameters[static_cast<size_t>(i)].verdict == Verdict::kNotIdentified;
 }
 
+// Whether the posterior is about as wide as the prior: it then means nothing where it is densest.
+bool IsAsWideAsPrior(const ParameterEstimate& parameter) {
+  return parameter.posterior_std_dev > kAsWide * parameter.prior_std_dev;
+}
+
 void AddBounds(const Findings& findings, const Estimate& estimate,
                std::vector<Diagnostic>& diagnostics) {
   for (int i = 0; i < findings.problem->dimension(); ++i) {
     const int bound = BoundReached(findings, i);
-    if (bound == 0 || PriorAsksForBound(findings, estimate, i)) continue;
+    const ParameterEstimate& parameter = estimate.parameters[static_cast<size_t>(i)];
+    if (bound == 0 || IsAsWideAsPrior(parameter) || PriorAsksForBound(findings, estimate, i)) {
+      continue;
+    }
     std::string message = absl::StrFormat("%s lies on the %s bound of its prior: the data ",
                                           findings.NameOf(i), bound < 0 ? "lower" : "upper");
-    const ParameterEstimate& parameter = estimate.parameters[static_cast<size_t>(i)];
-    if (findings.GoesByDraws(i) && parameter.verdict != Verdict::kNotIdentified) {
+    const bool piled_up = parameter.verdict == Verdict::kNotIdentified &&
+                          parameter.posterior_std_dev < kPiledUp * parameter.prior_std_dev;
+    if (findings.GoesByDraws(i) && !piled_up) {
       absl::StrAppendFormat(&message, "tell only that it is %s %.3g (97.5 %%)",
                             bound < 0 ? "below" : "above",
                             bound < 0 ? parameter.upper95 : parameter.lower95);

@@ -65,7 +65,8 @@ absl::Status ValidateNoise(int index, const MeasuredOutput& measured) {
   if (!noise.unknown && noise.absolute + noise.relative + noise.relative_to_max <= 0) {
     return InvalidField(FieldPath{"measured", index, "noise"},
                         absl::StrFormat("output %s needs a noise: at least one of absolute, "
-                                        "relative, relativeToMax must be above 0",
+                                        "relative, relativeToMax must be above 0, or the noise "
+                                        "unknown",
                                         measured.output));
   }
   return absl::OkStatus();

@@ -1,5 +1,6 @@
 #include "core/estimator/studies/posterior_study.h"
 
+#include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 #include <absl/strings/str_join.h>
 
@@ -47,14 +48,20 @@ absl::Status CheckJoint(const Prior& prior, size_t index,
 // Applies the criteria of Vehtari et al. (bayes/convergence.h).
 void AddNotConverged(Posterior& posterior) {
   if (posterior.method != PosteriorMethod::kMarkovChains) return;
-  if (posterior.r_hat <= kMaxRHat && posterior.effective_size >= kMinEffectiveSize) return;
+  std::vector<std::string> failed;
+  if (!(posterior.r_hat <= kMaxRHat)) {
+    failed.push_back(
+        absl::StrFormat("R̂ is %.3f and should be at most %.2f", posterior.r_hat, kMaxRHat));
+  }
+  if (!(posterior.effective_size >= kMinEffectiveSize)) {
+    failed.push_back(
+        absl::StrFormat("the draws are worth %.0f independent ones and should be worth %d",
+                        posterior.effective_size, static_cast<int>(kMinEffectiveSize)));
+  }
+  if (failed.empty()) return;
   posterior.diagnostics.push_back(
       {DiagnosticCode::kNotConverged,
-       absl::StrFormat(
-           "the Markov chains have not mixed: R̂ is %.3f and should be at most %.2f, and "
-           "the draws are worth %.0f independent ones and should be worth %d",
-           posterior.r_hat, kMaxRHat, posterior.effective_size,
-           static_cast<int>(kMinEffectiveSize))});
+       absl::StrCat("the Markov chains have not mixed: ", absl::StrJoin(failed, ", and "))});
 }
 
 }  // namespace

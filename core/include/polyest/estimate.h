@@ -122,7 +122,8 @@ struct ChannelEstimate {
   double noise_time_constant_s = 0;  // of the noise's correlation; 0: white
   int64_t outliers = 0;              // number of samples with less than half their weight
   // Variance of sums of 16 successive residuals ÷ that of as many independent ones: about 1 if
-  // model and noise are right; 0 if it is not known, as where outliers are handled.
+  // model and noise are right, less by what an error of the linearized model may add to it; 0 if it
+  // is not known, as where outliers are handled.
   double variance_ratio = 0;
   int64_t residual_sums = 0;  // number of such sums
   // Share of the noise's variance that is uncorrelated where the rest is correlated over

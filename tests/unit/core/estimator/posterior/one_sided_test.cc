@@ -62,5 +62,16 @@ TEST(OneSidedInformation, IsALimitAndNotThePrior) {
               HasSubstr("tell only that it is below 0.3"));
 }
 
+// The sample lies below every value of y = p/10⁵, so that the cost is least at p = 0, by a
+// millionth.
+TEST(OneSidedInformation, IsNoneWhereThePosteriorIsAsWideAsThePrior) {
+  const Problem problem =
+      TextProblem("p/100000", {UncertainParameter::Uniform("p", 0, 1).value()}, kNoiseOfPower);
+  const Estimate estimate = Processed(problem, {kValue})->CurrentEstimate().value();
+  EXPECT_EQ(estimate.parameters[0].map, 0);
+  EXPECT_EQ(estimate.parameters[0].verdict, Verdict::kNotIdentified);
+  EXPECT_FALSE(Has(estimate, DiagnosticCode::kAtPriorBound));
+}
+
 }  // namespace
 }  // namespace polyest::internal

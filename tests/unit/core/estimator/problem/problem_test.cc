@@ -191,7 +191,7 @@ TEST(ResolvedProblem, NeedsMorePointsThanTermsToAdaptAfterATensorGridToo) {
 TEST(ResolvedProblem, NeedsANoise) {
   EXPECT_EQ(Refusal([](Problem& p) { p.measured[1].noise = {}; }),
             "measured[1].noise: output x needs a noise: at least one of absolute, relative, "
-            "relativeToMax must be above 0");
+            "relativeToMax must be above 0, or the noise unknown");
 }
 
 TEST(ResolvedProblem, RefusesANoiseThatIsNegativeOrNotFinite) {
