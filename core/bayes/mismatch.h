@@ -49,13 +49,17 @@ struct ChannelSums {
   double log_variance_at_reference = 0;
   bool scale_unknown = false;
   bool correlation_unknown = false;
-  double degrees_factor = 1;  // NoiseModel::DegreesFactor
-  double spent = 0;           // degrees of freedom used up by parameters that are eliminated
+  double degrees_factor = 1;  // BoundedDegreesFactor, see bayes/noise.h
+  // By how much the outliers' part of χ², where they were judged, exceeds what they count.
+  double surplus = 0;
+  double spent = 0;  // degrees of freedom used up by parameters that are eliminated
 
   bool IsKnown() const { return !scale_unknown && !correlation_unknown; }
-  // Returns the expected χ² if the working noise is right: N, or less if outliers are handled or
-  // parameters have been eliminated.
-  double Degrees() const { return degrees_factor * static_cast<double>(samples.count()) - spent; }
+  // Returns the expected χ² if the working noise is right, for the outliers that there are: N
+  // without their handling, or less if parameters have been eliminated.
+  double Degrees() const {
+    return degrees_factor * static_cast<double>(samples.count()) + surplus - spent;
+  }
   // Returns r at d, in [−1, 1]; 0 without samples.
   double Lag1Correlation(const ConstVectorRef& d) const;
 };

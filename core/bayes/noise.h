@@ -55,6 +55,42 @@ inline double DegreesFactor(OutlierHandling outliers) {
   return 1;
 }
 
+// A sample of less weight counts as an outlier: |u| > √6 for Student's t, |u| > 2.69 for Huber.
+inline constexpr double kOutlierWeight = 0.5;
+
+// As DegreesFactor, of the samples that are no outliers: E[w u² | no outlier]/VarianceFactor. How
+// many gross errors there are and how large nobody knows, so that no χ² of all samples can be
+// expected, but the others have a truncated normal distribution whatever the outliers are.
+inline double InlierDegreesFactor(OutlierHandling outliers) {
+  switch (outliers) {
+    case OutlierHandling::kNone:
+      return 1;
+    case OutlierHandling::kStudentT:
+      return 0.6593814001;
+    case OutlierHandling::kHuber:
+      return 0.7900518225;
+  }
+  return 1;
+}
+
+// Returns what an outlier counts in the χ² from which a scale is learned, in place of w u²: a
+// constant, since the scale would grow with the gross errors otherwise. Student's t counts it as
+// any other sample. To Huber's estimate gross errors keep an influence ψ² = k², which the variance
+// of the estimate has to have: so ψ² is what counts, as in his proposal 2 (Robust Statistics, 1981,
+// §6.4), and the scale grows with their number, up to k² of each.
+inline double OutlierDegrees(OutlierHandling outliers) {
+  if (outliers != OutlierHandling::kHuber) return InlierDegreesFactor(outliers);
+  return kHuberThreshold * kHuberThreshold / VarianceFactor(outliers);
+}
+
+// As DegreesFactor, with OutlierDegrees for outliers.
+inline double BoundedDegreesFactor(OutlierHandling outliers) {
+  if (outliers != OutlierHandling::kHuber) return InlierDegreesFactor(outliers);
+  constexpr double kShareOfOutliers = 0.0071452019;  // P(|u| > 2.69)
+  return (1 - kShareOfOutliers) * InlierDegreesFactor(outliers) +
+         kShareOfOutliers * OutlierDegrees(outliers);
+}
+
 // Returns −log of the density behind the weight minus ½ OutlierWeight(u) u², at u and up to a
 // constant. For the t density −log is ½ (ν + 1) log(1 + u²/ν), for Huber's k |u| − ½ k² where |u| >
 // k and ½ u² elsewhere.

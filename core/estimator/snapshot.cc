@@ -103,7 +103,8 @@ void serialize(Archive& archive, PreviousSample& sample) {
 
 template <class Archive>
 void serialize(Archive& archive, ChannelSums& sums) {
-  archive(sums.samples, sums.differences, sums.log_variance, sums.log_variance_at_reference);
+  archive(sums.samples, sums.differences, sums.log_variance, sums.log_variance_at_reference,
+          sums.surplus);
 }
 
 template <class Archive>

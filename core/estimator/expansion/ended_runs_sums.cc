@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "core/bayes/noise.h"
 #include "core/estimator/expansion/regional_expansion.h"
 
 namespace polyest::internal {
@@ -36,6 +37,13 @@ void AddCounts(const EndedRuns& ended, const Vector& ratio, AbsorbedRows& absorb
   }
 }
 
+// Returns ChannelSums::surplus for a noise whose variance is `ratio` times that of then.
+double SurplusAt(const EndedRuns& ended, const NoiseModel& noise, size_t channel, double ratio) {
+  const double counted =
+      OutlierDegrees(noise.outliers) * static_cast<double>(ended.outliers[channel]);
+  return (ended.sums[channel].surplus + counted) / ratio - counted;
+}
+
 }  // namespace
 
 // The terms of the ended runs are polynomials of the shared germs, so that the expansion's own
@@ -62,6 +70,7 @@ void RegionalExpansion::TakeEndedRuns() {
     const ChannelSums& before = ended->sums[channel];
     sums.samples = before.samples.Substituted(transfer, shift, ratio[c]);
     sums.differences = before.differences.Substituted(transfer, shift, ratio[c]);
+    sums.surplus = SurplusAt(*ended, problem_.problem().measured[channel].noise, channel, ratio[c]);
     sums.spent = before.spent;
     for (Eigen::Index i = 0; i < check_phi_.rows(); ++i) {
       absorbed_.check_chi_squared(i, c) =

@@ -86,6 +86,7 @@ bool HasSizesOf(const AbsorbedRows& state, const AbsorbedRows& fresh, bool has_w
     if (!AreSums(sums.samples, terms) || !AreSums(sums.differences, terms)) return false;
     if (!IsVector(sums.log_variance, fresh.sums.front().log_variance.size())) return false;
     if (!std::isfinite(sums.log_variance_at_reference)) return false;
+    if (!std::isfinite(sums.surplus)) return false;
   }
   const auto same = [](const CorrelationProfile& a, const CorrelationProfile& b) {
     return a.HasSizesOf(b);
@@ -241,6 +242,7 @@ absl::Status RegionalExpansion::RestoreFit(ExpansionState& state, const Stop& st
     sums.differences = std::move(state.absorbed.sums[c].differences);
     sums.log_variance = std::move(state.absorbed.sums[c].log_variance);
     sums.log_variance_at_reference = state.absorbed.sums[c].log_variance_at_reference;
+    sums.surplus = state.absorbed.sums[c].surplus;
     state.absorbed.sums[c] = std::move(sums);
   }
   absorbed_ = std::move(state.absorbed);

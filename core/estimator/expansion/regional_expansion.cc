@@ -91,7 +91,7 @@ RegionalExpansion::RegionalExpansion(const ResolvedProblem& problem, const Sampl
     const bool found = noise_.channels[static_cast<size_t>(c)].time_constant_s > 0 &&
                        model.outliers == OutlierHandling::kNone;
     sums.correlation_unknown = model.correlation == NoiseCorrelation::kUnknown && learned && !found;
-    sums.degrees_factor = !problem_.uses_filters() ? DegreesFactor(model.outliers)
+    sums.degrees_factor = !problem_.uses_filters() ? BoundedDegreesFactor(model.outliers)
                           : IsTailed(c)            ? kFilteredDegreesFactor
                                                    : 1;
   }
@@ -321,9 +321,7 @@ void RegionalExpansion::AbsorbSample(int row, int c) {
   absorbed_.own_error += residual_variance_[column] / variance + absorbed_.carried_rate;
   absorbed_.carried_error += absorbed_.carried_rate;
   Normalize(VarianceFactor(outliers) * sigma * sigma, own_error, lack);
-  const bool is_outlier =
-      filters_ ? IsTailed(c) && FilteredOutlierWeight(deviation) < 0.5 : weight < 0.5;
-  if (is_outlier) ++absorbed_.outliers[static_cast<size_t>(c)];
+  CountOutlier(c, deviation);
   Compare(column, z, noise);
   CompareControls(column, variance);
   if (filters_) AddLogVariance(column, noise, variance);
@@ -331,17 +329,6 @@ void RegionalExpansion::AbsorbSample(int row, int c) {
   absorbed_.point_chi_squared.col(c).array() +=
       (outputs_.col(column).head(points()).array() - z).square() / variance;
   ++absorbed_.samples;
-}
-
-// Returns the deviation of the sample in units of its possible error there, or 0 if outliers are
-// not handled. `variance` is that of the sample about the expansion.
-double RegionalExpansion::DeviationFromCentre(int channel, const ConstVectorRef& coefficients,
-                                              double z, double variance) const {
-  const NoiseModel& model = problem_.problem().measured[static_cast<size_t>(channel)].noise;
-  if (model.outliers == OutlierHandling::kNone) return 0;
-  const double error = z - coefficients.dot(centre_phi_);
-  const double open = (spread_.transpose() * coefficients).squaredNorm();
-  return error / std::sqrt(variance + open);
 }
 
 // Adds to the normalization. `noise` is σ², `own_error` the residual's variance ρ, and `lack` the

@@ -334,6 +334,7 @@ std::vector<ChannelSums> Elimination::AddSumsTo(EndedRuns& ended, const Matrix& 
     sums[c].differences = sums[c].differences.Substituted(transfer, shift);
     ended.sums[c].samples.Add(sums[c].samples);
     ended.sums[c].differences.Add(sums[c].differences);
+    ended.sums[c].surplus += sums[c].surplus;
     ended.sums[c].spent += spent[static_cast<Eigen::Index>(c)];
   }
   return sums;

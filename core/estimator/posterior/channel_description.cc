@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/bayes/noise.h"
 #include "core/estimator/posterior/independent_share.h"
 #include "core/estimator/posterior/noise_learning.h"
 #include "core/estimator/posterior/residual_tests.h"
@@ -55,6 +56,24 @@ void DescribeSums(const AssessmentRequest& request, const Vector& eta, const Vec
   channel.residual_sums = blocks.count();
 }
 
+// Returns χ² in units in which N is expected. Outliers count as one each, as long as they may be
+// gross errors, of which neither model nor noise knows; else for what they are. `chi_squared` is
+// that of the sums for the noise as it is taken to be, `used` the degrees of freedom used up.
+double JudgedChiSquared(const AssessmentRequest& request, int c, double chi_squared, double used) {
+  const ChannelSums& sums = request.expansion->sums()[static_cast<size_t>(c)];
+  const OutlierHandling handling =
+      request.problem->problem().measured[static_cast<size_t>(c)].noise.outliers;
+  const bool weighted = handling != OutlierHandling::kNone && !request.problem->uses_filters();
+  if (!weighted || sums.scale_unknown) return (chi_squared - sums.surplus) / sums.degrees_factor;
+  const auto outliers = static_cast<double>(request.expansion->Outliers(c));
+  const double samples = static_cast<double>(sums.samples.count());
+  const double of_outliers = sums.surplus + OutlierDegrees(handling) * outliers;
+  const double others = (chi_squared - of_outliers) / InlierDegreesFactor(handling);
+  return MayBeGrossErrors(handling, outliers / samples, others, samples - outliers - used)
+             ? others + outliers
+             : chi_squared / DegreesFactor(handling);
+}
+
 void DescribeChannel(const AssessmentRequest& request, const Cost& cost, const Vector& eta,
                      const Vector& d, const PosteriorDraws& posterior, double fitted, int c,
                      ChannelEstimate& channel) {
@@ -69,10 +88,11 @@ void DescribeChannel(const AssessmentRequest& request, const Cost& cost, const V
       sums.scale_unknown
           ? std::max(kMinMeanSquare, MeanChiSquared(cost, sums, posterior) / sums.Degrees())
           : 1;
-  channel.chi_squared = sums.samples.ChiSquared(d) / mean_square / sums.degrees_factor;
   channel.noise_std_dev = std::sqrt(mean_square) * noise.scale * summary.RootMeanSquareNoise();
   const double share =
       fitted * samples / static_cast<double>(request.record->samples()) + sums.spent;
+  channel.chi_squared =
+      JudgedChiSquared(request, c, sums.samples.ChiSquared(d) / mean_square, share);
   channel.lag1_correlation =
       std::clamp(sums.Lag1Correlation(d) + Lag1Correction(share, samples), -1.0, 1.0);
   DescribeSums(request, eta, d, c, channel);

@@ -16,6 +16,13 @@ namespace {
 
 // A scale is not revised by less than this factor: the sums marginalize over it.
 constexpr double kWorthIt = 1.25;
+// As kWorthIt where outliers are handled: their part of χ², which is taken for expected, does not
+// change when the sums marginalize over the scale.
+constexpr double kWorthItWithOutliers = 1.1;
+// Power of the ratio of χ² to what is expected by which the scale is revised, and that where
+// outliers are handled: with a larger scale there are fewer outliers, so that χ² falls by less than
+// the square of the scale.
+constexpr double kPower = 0.5, kPowerWithOutliers = 0.75;
 // Limits of a scale's change in one revision: the expansion must be able to follow.
 constexpr double kMaxFall = 0.5;
 constexpr double kMaxRise = 4;
@@ -146,18 +153,24 @@ class Revision {
     return noise.white_share == 0 && noise.time_constant_s == ended->noise_time_constant_s[c];
   }
 
+  // What outliers add to χ² beyond what they count is on either side of Σ w u² = Degrees(), and
+  // would only hide how far the scale is from right.
   void ReviseScale(int c, const ChannelSums& sums, double share, ChannelNoise& noise) {
     const double discount = expansion_.Discount(c);
     if (discount > kMaxDiscount * sums.Degrees()) return;
-    const double degrees = std::max(1.0, sums.Degrees() - discount - share);
-    const double chi_squared = std::max(0.0, sums.samples.ChiSquared(d_) - discount);
-    const double factor = std::clamp(std::sqrt(chi_squared / degrees), kMaxFall, kMaxRise);
+    const double spent = sums.surplus + discount;
+    const double degrees = std::max(1.0, sums.Degrees() - spent - share);
+    const double chi_squared = std::max(0.0, sums.samples.ChiSquared(d_) - spent);
+    const bool weighted = IsWeighted(c);
+    const double power = weighted ? kPowerWithOutliers : kPower;
+    const double factor = std::clamp(std::pow(chi_squared / degrees, power), kMaxFall, kMaxRise);
     // The learned scale is not included.
     const RecordSummary::Channel& channel = record_.channels()[static_cast<size_t>(c)];
     const double least = kLeastNoiseToSignal * channel.largest / channel.RootMeanSquareNoise();
     const double revised = std::max(noise.scale * factor, least);
     const double ratio = revised / noise.scale;
-    if (ratio < kWorthIt && ratio > 1 / kWorthIt) return;
+    const double worth_it = weighted ? kWorthItWithOutliers : kWorthIt;
+    if (ratio < worth_it && ratio > 1 / worth_it) return;
     noise.scale = revised;
     changed_ = true;
   }
@@ -275,10 +288,16 @@ class Revision {
     changed_ = true;
   }
 
+  bool IsWeighted(int c) const {
+    const NoiseModel& model = problem_.problem().measured[static_cast<size_t>(c)].noise;
+    return model.outliers != OutlierHandling::kNone;
+  }
+
   bool HandlesOutliers() const {
-    return std::ranges::any_of(problem_.problem().measured, [](const MeasuredOutput& measured) {
-      return measured.noise.outliers != OutlierHandling::kNone;
-    });
+    for (int c = 0; c < problem_.channels(); ++c) {
+      if (IsWeighted(c)) return true;
+    }
+    return false;
   }
 
   // Revises the posterior's centre and covariance from the curvature. The covariance is limited to

@@ -12,6 +12,11 @@ constexpr double kExcessDeviations = 6;
 constexpr double kExcessRatio = 1.2;
 constexpr double kExcessRatioWithOutliers = 1.5;
 constexpr double kExcessRatioWithTails = 2;
+constexpr double kMaxShareForStudentT = 1.0 / 3;
+constexpr double kMaxShareForHuber = 0.15;
+constexpr double kDeviationsOfOthers = 4;
+// √(Var[w u²]/E[w u²]²) of samples that are no outliers: 1.00 for Student's t, 1.08 for Huber.
+constexpr double kDeviationOfOthers = 1.1;
 constexpr double kCorrelationDeviations = 4;
 constexpr double kCorrelated = 0.05;
 constexpr double kSlowlyCorrelated = 1.5;
@@ -29,6 +34,16 @@ bool ExceedsNoise(const ChannelEstimate& channel, double degrees, OutlierHandlin
   if (!(channel.chi_squared > ratio * degrees)) return false;
   return channel.chi_squared > degrees + kExcessDeviations * std::sqrt(2 * samples) ||
          NormalDeviateOfChiSquared(channel.chi_squared, std::max(1.0, degrees)) > kExcessDeviations;
+}
+
+bool MayBeGrossErrors(OutlierHandling outliers, double share, double chi_squared_of_others,
+                      double degrees) {
+  const bool huber = outliers == OutlierHandling::kHuber;
+  if (share > (huber ? kMaxShareForHuber : kMaxShareForStudentT)) return false;
+  const double expected = std::max(1.0, degrees);
+  const double deviation = kDeviationOfOthers * std::sqrt(expected);
+  return chi_squared_of_others <=
+         std::max(kExcessRatio * expected, expected + kDeviationsOfOthers * deviation);
 }
 
 double ResidualToNoise(const ChannelEstimate& channel, double degrees) {

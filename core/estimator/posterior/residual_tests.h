@@ -12,11 +12,20 @@ namespace polyest::internal {
 // Returns whether χ² is too large for the noise assumed: for a right model it has the mean ν, the
 // degrees of freedom, and a standard deviation of at most √(2N). It must exceed ν by six of them,
 // or be as improbable as six standard deviations of a normal variable, and exceed ν by a fifth,
-// which is noise that is larger by a tenth; by a half if outliers are handled, because some of them
-// are expected and their weight is small but not 0; to twice ν if filters do, whose χ² grows with
-// the logarithm of an outlier (bayes/noise.h).
+// which is noise that is larger by a tenth; by a half if outliers are handled, because χ² has those
+// that are not taken for gross errors, whose weight is small but not 0; to twice ν if filters do,
+// whose χ² grows with the logarithm of an outlier (bayes/noise.h).
 bool ExceedsNoise(const ChannelEstimate& channel, double degrees, OutlierHandling outliers,
                   bool filtered);
+// Returns whether a channel's outliers may be gross errors, which say nothing of model and noise:
+// they are not too many, and χ² of the others is not too large for the noise. For a right model its
+// mean is `degrees`, the others' degrees of freedom, and its standard deviation at most 1.1
+// √degrees. It must exceed the mean by four of them and by a fifth to contradict. Noise that is
+// larger by a fifth reaches that, and of samples that are all far too large those that are no
+// outliers exceed it by four fifths. `share` of outliers may be up to a third for Student's t. For
+// Huber it may be 0.15: more leave an influence for which a known noise does not account.
+bool MayBeGrossErrors(OutlierHandling outliers, double share, double chi_squared_of_others,
+                      double degrees);
 // Returns the root mean square of the residuals in units of the noise assumed, √(χ²/ν), with at
 // least one degree of freedom.
 double ResidualToNoise(const ChannelEstimate& channel, double degrees);

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <functional>
 
+#include "core/bayes/noise.h"
+
 namespace polyest::internal {
 namespace {
 
@@ -66,7 +68,10 @@ void EndedRuns::Append(int run_index, int64_t first, int64_t end, const RunPath&
 std::vector<ChannelSums> SumsWithRemainder(const std::vector<MeasuredOutput>& measured,
                                            const EndedRuns& ended) {
   std::vector<ChannelSums> sums = ended.sums;
-  for (size_t c = 0; c < sums.size(); ++c) sums[c].scale_unknown = measured[c].noise.unknown;
+  for (size_t c = 0; c < sums.size(); ++c) {
+    sums[c].scale_unknown = measured[c].noise.unknown;
+    sums[c].degrees_factor = BoundedDegreesFactor(measured[c].noise.outliers);
+  }
   ChannelSums& remainder = sums.emplace_back(ended.basis->size());
   remainder.log_variance = ended.remainder;
   // A group of its own.
@@ -90,7 +95,7 @@ bool IsWellFormed(const EndedRuns& ended, int shared, int own, int channels) {
   }
   for (const ChannelSums& sums : ended.sums) {
     if (!AreSumsOf(sums.samples, terms) || !AreSumsOf(sums.differences, terms)) return false;
-    if (!std::isfinite(sums.spent)) return false;
+    if (!std::isfinite(sums.spent) || !std::isfinite(sums.surplus)) return false;
   }
   return ended.region.dimension() == shared && ended.basis->dimension() == shared &&
          IsFiniteMatrix(ended.paths, own * (1 + shared + own), runs) &&
