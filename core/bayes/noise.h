@@ -73,22 +73,32 @@ inline double InlierDegreesFactor(OutlierHandling outliers) {
   return 1;
 }
 
-// Returns what an outlier counts in the χ² from which a scale is learned, in place of w u²: a
-// constant, since the scale would grow with the gross errors otherwise. Student's t counts it as
-// any other sample. To Huber's estimate gross errors keep an influence ψ² = k², which the variance
-// of the estimate has to have: so ψ² is what counts, as in his proposal 2 (Robust Statistics, 1981,
-// §6.4), and the scale grows with their number, up to k² of each.
+// Returns what an outlier counts in the χ² from which a scale is learned, in place of
+// w u²/VarianceFactor: a constant, since the scale would grow with the gross errors otherwise. For
+// Student's t it is the mean of w u² over that distribution, 1. To Huber's estimate gross errors
+// keep an influence ψ² = k², which the variance of the estimate has to have: so ψ² is what counts,
+// as in his proposal 2 (Robust Statistics, 1981, §6.4). Either way the scale grows with the number
+// of gross errors by about what they take from the information: with up to 20 % of them the
+// standard deviation of an estimate is 0.93 to 1.01 of that of the asymptotic theory.
 inline double OutlierDegrees(OutlierHandling outliers) {
-  if (outliers != OutlierHandling::kHuber) return InlierDegreesFactor(outliers);
-  return kHuberThreshold * kHuberThreshold / VarianceFactor(outliers);
+  switch (outliers) {
+    case OutlierHandling::kNone:
+      return 1;
+    case OutlierHandling::kStudentT:
+      return 1 / VarianceFactor(outliers);
+    case OutlierHandling::kHuber:
+      return kHuberThreshold * kHuberThreshold / VarianceFactor(outliers);
+  }
+  return 1;
 }
 
 // As DegreesFactor, with OutlierDegrees for outliers.
 inline double BoundedDegreesFactor(OutlierHandling outliers) {
-  if (outliers != OutlierHandling::kHuber) return InlierDegreesFactor(outliers);
-  constexpr double kShareOfOutliers = 0.0071452019;  // P(|u| > 2.69)
-  return (1 - kShareOfOutliers) * InlierDegreesFactor(outliers) +
-         kShareOfOutliers * OutlierDegrees(outliers);
+  // P(|u| > √6) and P(|u| > 2.69)
+  const double share = outliers == OutlierHandling::kStudentT ? 0.0143060669
+                       : outliers == OutlierHandling::kHuber  ? 0.0071452019
+                                                              : 0;
+  return (1 - share) * InlierDegreesFactor(outliers) + share * OutlierDegrees(outliers);
 }
 
 // Returns −log of the density behind the weight minus ½ OutlierWeight(u) u², at u and up to a

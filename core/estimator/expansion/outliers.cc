@@ -18,8 +18,11 @@ double RegionalExpansion::DeviationFromCentre(int channel, const ConstVectorRef&
   return error / std::sqrt(variance + open);
 }
 
-// Counts the sample if it is an outlier, whose part of χ² is taken for expected.
-void RegionalExpansion::CountOutlier(int channel, double deviation) {
+// Counts the sample if it is an outlier, whose part of χ² is taken for expected. `variance` is R as
+// in the sums: where gross errors are large, the posterior's spread, which only the weight has, is
+// not negligible in their part.
+void RegionalExpansion::CountOutlier(int channel, const ConstVectorRef& coefficients, double z,
+                                     double variance, double deviation) {
   const auto c = static_cast<size_t>(channel);
   if (filters_) {
     const bool tailed = IsTailed(channel) && FilteredOutlierWeight(deviation) < kOutlierWeight;
@@ -27,11 +30,10 @@ void RegionalExpansion::CountOutlier(int channel, double deviation) {
     return;
   }
   const OutlierHandling outliers = problem_.problem().measured[c].noise.outliers;
-  const double weight = OutlierWeight(outliers, deviation);
-  if (weight >= kOutlierWeight) return;
+  if (OutlierWeight(outliers, deviation) >= kOutlierWeight) return;
   ++absorbed_.outliers[c];
-  absorbed_.sums[c].surplus +=
-      weight * deviation * deviation / VarianceFactor(outliers) - OutlierDegrees(outliers);
+  const double error = z - coefficients.dot(centre_phi_);
+  absorbed_.sums[c].surplus += error * error / variance - OutlierDegrees(outliers);
 }
 
 }  // namespace polyest::internal

@@ -321,7 +321,7 @@ void RegionalExpansion::AbsorbSample(int row, int c) {
   absorbed_.own_error += residual_variance_[column] / variance + absorbed_.carried_rate;
   absorbed_.carried_error += absorbed_.carried_rate;
   Normalize(VarianceFactor(outliers) * sigma * sigma, own_error, lack);
-  CountOutlier(c, deviation);
+  CountOutlier(c, coefficients, z, variance, deviation);
   Compare(column, z, noise);
   CompareControls(column, variance);
   if (filters_) AddLogVariance(column, noise, variance);

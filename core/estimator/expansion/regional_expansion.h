@@ -260,7 +260,8 @@ class RegionalExpansion {
   double DeviationFromCentre(int channel, const ConstVectorRef& coefficients, double z,
                              double variance) const;
   // Adds the sample of a channel in the row, if there is one.
-  void CountOutlier(int channel, double deviation);
+  void CountOutlier(int channel, const ConstVectorRef& coefficients, double z, double variance,
+                    double deviation);
   void AbsorbSample(int row, int channel);
   void AddDifference(int channel, const ConstVectorRef& coefficients, double error,
                      double variance);
