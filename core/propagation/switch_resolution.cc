@@ -10,6 +10,8 @@ namespace {
 
 // Arguments within this part of their tolerance of a surface are at it.
 constexpr double kAtSurface = 1e-3;
+// Below this part of an argument a change of it is rounding error.
+constexpr double kRoundingOfArguments = 1e-12;
 // Two gradients whose directions differ by less, squared, are the same.
 constexpr double kParallel = 1e-10;
 
@@ -108,6 +110,7 @@ void SwitchedRows::GatherOthers(Eigen::Index row, double time_s, const ConstBloc
                                 Eigen::Index except, const Eigen::ArrayXXd& tolerance) {
   variants_.Load(row, time_s, states, modes_.values, 1);
   const Eigen::ArrayXXd& arguments = variants_.Arguments();
+  before_ = arguments.row(0).transpose();
   for (Eigen::Index i = 0; i < switches(); ++i) {
     if (i == except || modes_.sliding(row, i)) continue;
     const double within = held_(row, i) ? kInfinity : kAtSurface * tolerance(row, i);
@@ -121,7 +124,7 @@ bool SwitchedRows::Settle(Eigen::Index row, double time_s, const ConstBlock& sta
   held_.row(row).setConstant(false);
   GatherSliding(modes_, row);
   GatherOthers(row, time_s, states, -1, tolerance);
-  return Resolve(row, time_s, states);
+  return ResolveAll(row, time_s, states, tolerance);
 }
 
 bool SwitchedRows::Leave(Eigen::Index row, double time_s, const ConstBlock& states,
@@ -139,7 +142,46 @@ bool SwitchedRows::Leave(Eigen::Index row, double time_s, const ConstBlock& stat
         {which, upwards ? mode : mode - step, upwards ? mode + step : mode, status});
   }
   GatherOthers(row, time_s, states, which, tolerance);
-  return Resolve(row, time_s, states);
+  return ResolveAll(row, time_s, states, tolerance);
+}
+
+// Resolves the surfaces and what follows from it at the same instant. Arguments depend on modes
+// without a cycle, so that as many passes as there are switches are enough. Only surfaces that
+// resolve differently after each jump can need more. Then a switch is left out of its bounds, and
+// the integrator, which finds it again without having moved, reports the endless sequence.
+bool SwitchedRows::ResolveAll(Eigen::Index row, double time_s, const ConstBlock& states,
+                              const Eigen::ArrayXXd& tolerance) {
+  for (Eigen::Index pass = 0; pass <= switches(); ++pass) {
+    if (!Resolve(row, time_s, states)) return false;
+    if (!TakeJumps(row, time_s, states, tolerance)) return true;
+  }
+  return true;
+}
+
+// Takes the natural modes of the switches whose arguments jumped when the modes of others changed,
+// as mod(t, T) − T/2 does where mod wraps. Such an argument is not at the surface that it jumps
+// across, so that the direction in which it moves must not decide its mode. Returns whether any
+// argument jumped.
+bool SwitchedRows::TakeJumps(Eigen::Index row, double time_s, const ConstBlock& states,
+                             const Eigen::ArrayXXd& tolerance) {
+  variants_.Load(row, time_s, states, modes_.values, 1);
+  const Eigen::ArrayXXd& arguments = variants_.Arguments();
+  bool any = false;
+  for (Eigen::Index i = 0; i < switches(); ++i) {
+    const double argument = arguments(0, i);
+    const double rounding = kRoundingOfArguments * (std::abs(argument) + std::abs(before_(i)));
+    const bool jumps = std::abs(argument - before_(i)) > tolerance(row, i) + rounding;
+    before_(i) = argument;
+    if (!jumps) continue;
+    any = true;
+    std::erase_if(surfaces_, [i](const AtSurface& at) { return at.which == i; });
+    modes_.sliding(row, i) = false;
+    double& mode = modes_.values(row, 1 + i);
+    mode = NaturalMode(model_->switches()[static_cast<size_t>(i)], argument, mode);
+    // It may have jumped onto a surface, as mod(t, T) does onto 0.
+    Gather(i, mode, argument, kAtSurface * tolerance(row, i) + rounding);
+  }
+  return any;
 }
 
 bool SwitchedRows::Resolve(Eigen::Index row, double time_s, const ConstBlock& states) {

@@ -41,6 +41,7 @@ SwitchedRows::SwitchedRows(const SwitchingModel* model, const Eigen::ArrayXXd* p
     array->setZero(number);
   }
   row_rates_.setZero(states);
+  before_.setZero(number);
 }
 
 void SwitchedRows::SetSmoothSpan(double from_s, double until_s, double difference_s) {

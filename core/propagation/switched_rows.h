@@ -15,6 +15,9 @@
 // effects add, as those of independent friction forces do. What the equations leave open, such as
 // how several friction forces share the load of masses that all stick, is taken with λ = ½ as far
 // as that goes; a switch beyond its limits then keeps one of its modes, and the others hold it.
+//
+// An argument that depends on the mode of another switch may jump when that mode changes. Its
+// switch then takes the mode of the new argument at the same instant.
 
 #include <Eigen/Core>
 #include <vector>
@@ -112,7 +115,11 @@ class SwitchedRows final : public RowSystem {
   void Analyse(Eigen::Index row, double time_s, const ConstBlock& states, const Modes& modes);
   void Differentiate(Eigen::Index row, double time_s);
   void SolveSliding();
+  bool ResolveAll(Eigen::Index row, double time_s, const ConstBlock& states,
+                  const Eigen::ArrayXXd& tolerance);
   bool Resolve(Eigen::Index row, double time_s, const ConstBlock& states);
+  bool TakeJumps(Eigen::Index row, double time_s, const ConstBlock& states,
+                 const Eigen::ArrayXXd& tolerance);
   bool Correct();
   void Accept(Eigen::Index row);
   bool IsDependent(size_t surface);
@@ -146,6 +153,7 @@ class SwitchedRows final : public RowSystem {
   // What was found about the row that was analysed last.
   std::vector<AtSurface> surfaces_;
   const Eigen::ArrayXXd* slopes_ = nullptr;
+  Eigen::ArrayXd before_;     // switches: arguments before the modes changed
   Eigen::ArrayXXd changes_;   // surfaces × states: Δ_j
   Eigen::ArrayXXd effects_;   // surfaces²: ∇a_i · Δ_j
   Eigen::ArrayXd drift_;      // surfaces: ȧ_i without what slides

@@ -45,6 +45,7 @@ class SwitchingIntegrator final : public BlockIntegrator {
   void Begin(double span_s, double stop_s);
   bool ChooseTrials(double time_s, double stop_s);
   void TakeTrials();
+  bool IsRounding(Eigen::Index row);
   void JudgeFull(Eigen::Index row);
   void JudgeLocating(Eigen::Index row);
   double ErrorOf(Eigen::Index row);

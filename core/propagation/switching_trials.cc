@@ -25,6 +25,14 @@ double SwitchingIntegrator::ErrorOf(Eigen::Index row) {
   return norm;
 }
 
+// Whether the step on trial leads from a switching to a stop that follows within the resolution of
+// the time. What is seen of its errors and of the switch that was just left is rounding error.
+bool SwitchingIntegrator::IsRounding(Eigen::Index row) {
+  const RowProgress& at = row_of(row);
+  return at.hits_stop && at.trial_s <= Resolution(at) && at.switched_s == at.end_s &&
+         steps_.ends().row(row).isFinite().all();
+}
+
 void SwitchingIntegrator::JudgeFull(Eigen::Index row) {
   RowProgress& at = row_of(row);
   constexpr int kMostRejectionsByLook = 8;
@@ -34,7 +42,8 @@ void SwitchingIntegrator::JudgeFull(Eigen::Index row) {
   const double worst = std::max(error, look_error);
   const double factor = std::clamp(0.9 * std::pow(worst, -0.2), 0.2, 5.0);
   const double length_s = at.trial_s;
-  if (!(worst <= 1)) {
+  const bool rounding = IsRounding(row);
+  if (!(worst <= 1) && !rounding) {
     at.next_s = length_s * std::min(factor, 0.9);
     at.rejections_by_look += error <= 1 ? 1 : 0;
     looks_.Undo(row);
@@ -43,7 +52,7 @@ void SwitchingIntegrator::JudgeFull(Eigen::Index row) {
   }
   at.rejections_by_look = 0;
   const Crossing crossing = looks_.FirstLeft(row, at.which, at.upwards);
-  if (!crossing.found) {
+  if (!crossing.found || (rounding && switched_.Departing(row, at.which) != 0)) {
     NoteStiffness(row, length_s);
     at.next_s = at.hits_stop ? std::max(at.next_s, length_s * factor) : length_s * factor;
     return Accept(row, length_s, at.hits_stop);

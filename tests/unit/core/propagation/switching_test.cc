@@ -96,6 +96,68 @@ TEST(Switching, FollowsAConditionThatIsPeriodicInTime) {
                });
 }
 
+// Where mod wraps, a condition on it jumps across its own surface at the same instant.
+TEST(Switching, FollowsASquareWaveByMod) {
+  for (const char* wave :
+       {"if(mod(t, p) < p/2, 1, -1)", "if(mod(t, p) >= p/2, -1, 1)", "sign(p/2 - mod(t, p))",
+        "if(t - p*floor(t/p) < p/2, 1, -1)", "if(floor(4*mod(t, p)/p) < 1.5, 1, -1)",
+        "if(mod(t, p) < p/2, 1, if(mod(t, p) < 3/4*p, -1, -1))"}) {
+    SCOPED_TRACE(wave);
+    ExpectMotion({.states = {{"x", wave}}, .outputs = {{"x", "x"}}}, "p", {0.6, 1, 3.7, 4, pi},
+                 12.5, 0.1, kAccumulated, [](double t, double p) {
+                   const double rest = t - p * std::floor(t / p);
+                   return std::min(rest, p - rest);
+                 });
+  }
+}
+
+TEST(Switching, FollowsCornersOfASawTooth) {
+  struct Case {
+    const char* rate;
+    double (*of_period)(double rest, double p);  // the integral from the beginning of a period
+  };
+  const auto above = [](double rest, double p) {
+    const double beyond = std::max(rest - p / 2, 0.0);
+    return beyond * beyond / 2;
+  };
+  const auto below = [](double rest, double p) {
+    const double rising = std::min(rest, p / 4);
+    return rising * rising / 2 + p / 4 * (rest - rising);
+  };
+  const auto folded = [](double rest, double p) {
+    const double beyond = rest - p / 2;
+    return p * p / 8 + beyond * std::abs(beyond) / 2;
+  };
+  for (const Case& at : {Case{"max(mod(t, p) - p/2, 0)", above}, Case{"min(mod(t, p), p/4)", below},
+                         Case{"abs(mod(t, p) - p/2)", folded}}) {
+    SCOPED_TRACE(at.rate);
+    ExpectMotion({.states = {{"x", at.rate}}, .outputs = {{"x", "x"}}}, "p", {0.6, 1, 3.7, 4, pi},
+                 12.5, 0.1, kAccumulated, [&at](double t, double p) {
+                   const double whole = std::floor(t / p);
+                   return whole * at.of_period(p, p) + at.of_period(t - whole * p, p);
+                 });
+  }
+}
+
+// A threshold between 2 and 2/3 jumps while x is far from where it goes, or slides on it. x then
+// goes there and slides.
+TEST(Switching, StaysWhereItIsWhenAThresholdJumps) {
+  static constexpr double kLow = 2.0 / 3, kHigh = 2;
+  ExpectMotion({.states = {{"x", "if(x*if(t > start, 3, 1) < 2, 1, -1)"}}, .outputs = {{"x", "x"}}},
+               "start", {0.33, 0.5, 1, 1.234, 1.9, 3}, 6, 0.1, kAccumulated,
+               [](double t, double start) {
+                 if (start < kLow) return std::min(t, kLow);
+                 const double top = std::min(t, std::min(start, kHigh));
+                 return t < start ? top : std::max(top - (t - start), kLow);
+               });
+  ExpectMotion({.states = {{"x", "if(x*if(t > start, 1, 3) < 2, 1, -1)"}}, .outputs = {{"x", "x"}}},
+               "start", {0.33, 0.5, 1, 1.234, 1.9, 3}, 6, 0.1, kAccumulated,
+               [](double t, double start) {
+                 const double low = std::min(t, std::min(start, kLow));
+                 return t < start ? low : std::min(low + (t - start), kHigh);
+               });
+}
+
 TEST(Switching, EmptiesATankWhoseOutflowEndsAtZero) {
   // √x is undefined beyond.
   ExpectMotion({.states = {{"x", "-c*if(x > 0, sqrt(x), 0)"}},
