@@ -46,8 +46,8 @@ std::vector<Minimum> DistinctMinima(std::vector<Minimum> found, const Minimizati
                                     const MinimizerOptions& options);
 
 // Returns where SLSQP gets from `start`, moved inside, until its steps are within
-// options.relative_step. The point is lower than the start, and near a minimum, but need not be
-// one.
+// options.relative_step, or the start itself where that is lower. The point is usually near a
+// minimum, but need not be one.
 Vector DescendFrom(const MinimizationProblem& problem, const Vector& start,
                    const MinimizerOptions& options, const Stop& stop);
 

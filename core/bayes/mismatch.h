@@ -50,7 +50,8 @@ struct ChannelSums {
   bool scale_unknown = false;
   bool correlation_unknown = false;
   double degrees_factor = 1;  // BoundedDegreesFactor, see bayes/noise.h
-  // By how much the outliers' part of χ², where they were judged, exceeds what they count.
+  // χ² of the samples that count as outliers, at the point that decided on their weights, less
+  // OutlierDegrees for each.
   double surplus = 0;
   double spent = 0;  // degrees of freedom used up by parameters that are eliminated
 

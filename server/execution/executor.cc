@@ -149,7 +149,7 @@ void Executor::Run(Worker& self) {
     --lane.running;
     --lane.accepted;
     --accepted_;
-    GiveTurn(name, lane);  // this thread is there for it
+    GiveTurn(name, lane);  // this thread is awake for it
     if (lane.accepted == 0) lanes_.erase(name);
     if (accepted_ > 0) continue;
     idle_.notify_all();
@@ -184,7 +184,7 @@ void Strand::Run() {
       if (tasks_.empty()) return;
     }
     // Where others wait, the next task goes to the end of the queue, so that a busy strand does not
-    // keep them from their turn. Where nobody does, this thread has all at hand.
+    // keep them from their turn. Where nobody does, this thread runs it: no other needs to wake up.
     if (!executor_.GoOn(lane_)) break;
   }
   executor_.Enqueue(lane_, [self = shared_from_this()] { self->Run(); });

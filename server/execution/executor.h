@@ -64,6 +64,7 @@ class Executor {
     int running = 0;
     bool in_turn = false;
   };
+  // What a thread of the executor waits by while it sleeps.
   struct Worker {
     std::condition_variable woken;
     bool asleep = false;
@@ -73,16 +74,20 @@ class Executor {
   absl::Status Reserve(const std::string& lane, Admission admission);
   // Queues a task whose room has been taken. The room is given back after the task.
   void Enqueue(const std::string& lane, Task task);
-  // Gives back the room of a task that has ended, and returns true, if the thread may go on with
-  // another task of the same strand, because nobody waits for the thread or for the lane.
+  // Returns whether a thread may go on with another task of the strand whose task has ended,
+  // because nobody waits for a thread or for the lane. If so, gives back the room of the task that
+  // ended.
   bool GoOn(const std::string& lane);
   void Run(Worker& self);
   // Waits for a turn, or for the end.
   void Await(Worker& self, std::unique_lock<std::mutex>& lock);
-  // The following are called with the mutex held. GiveTurn puts the lane among those that take
-  // turns, if it may run a task, and tells whether it did; a thread must be there for that. Rouse
-  // picks one that sleeps, if any; it is then to be notified, best when it finds the mutex free.
+  // The following are called with the mutex held.
+
+  // Puts the lane among those that take turns, if it may run a task. Returns whether it did: a
+  // thread must then be awake for it.
   bool GiveTurn(const std::string& name, Lane& lane);
+  // Picks a thread that sleeps; null if none does. The caller notifies it, best without the mutex,
+  // which it needs to wake up.
   Worker* Rouse();
   void WakeAll();
 

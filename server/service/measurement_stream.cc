@@ -223,8 +223,9 @@ bool MeasurementFlow::HasBatch() const {
   return !end_ && stage_ == Stage::kReady && !inbox_.empty() && HasRoom();
 }
 
-// Tells whether taking a batch costs less than handing it to another thread, and waits for nothing.
-// What a batch was that comes again must be read from the journal.
+// Returns whether taking the batch takes no longer than handing it to another thread. A batch that
+// comes again waits for the journal, to be compared with what it was, and one of a journal that
+// daemons share may wait until this daemon owns the session.
 bool MeasurementFlow::IsQuicklyTaken(const v1::StreamMeasurementsRequest& request) const {
   return !context_.sessions.shared() && request.sequence() == session_->taken().sequence + 1 &&
          request.ByteSizeLong() <= kQuickBytes;

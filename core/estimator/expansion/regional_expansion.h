@@ -259,9 +259,9 @@ class RegionalExpansion {
   void EndRunOfSums();
   double DeviationFromCentre(int channel, const ConstVectorRef& coefficients, double z,
                              double variance) const;
-  // Adds the sample of a channel in the row, if there is one.
   void CountOutlier(int channel, const ConstVectorRef& coefficients, double z, double variance,
                     double deviation);
+  // Adds the sample of a channel in the row, if there is one.
   void AbsorbSample(int row, int channel);
   void AddDifference(int channel, const ConstVectorRef& coefficients, double error,
                      double variance);

@@ -49,10 +49,10 @@ void DescribeSums(const AssessmentRequest& request, const Vector& eta, const Vec
   const double of_all = sums.samples.ChiSquared(d) / static_cast<double>(sums.samples.count());
   const double ratio = blocks.MeanSquare(delta) / of_all;
   if (!(ratio > 1 / kAlike && ratio < kAlike)) return;
-  // The error of the linearization lasts for many samples, and then counts in the sums as often as
-  // they are long.
-  const double at_most = ResidualBlocks::kLength * std::abs(ratio - 1);
-  channel.variance_ratio = std::max(0.0, ratio * blocks.VarianceRatio(delta) - at_most);
+  // An error of the linearization that lasts for a whole block adds kLength times its mean square
+  // to the variance ratio. So much is taken off, because it says nothing of the noise.
+  const double by_linearization = ResidualBlocks::kLength * std::abs(ratio - 1);
+  channel.variance_ratio = std::max(0.0, ratio * blocks.VarianceRatio(delta) - by_linearization);
   channel.residual_sums = blocks.count();
 }
 

@@ -112,7 +112,8 @@ struct ChannelEstimate {
   int64_t samples = 0;  // number of them
   // Σ (z − y)²/R at map, of whitened residuals where the noise is correlated; about `samples`,
   // less the number of parameters fitted to them, when model and noise are right, and by
-  // construction when the noise was unknown.
+  // construction when the noise was unknown. Where outliers are handled, each counts as one unless
+  // there are too many of them to be gross errors.
   double chi_squared = 0;
   // Root mean square of the noise: as assumed or, where it was unknown, as estimated; in the
   // output's unit.

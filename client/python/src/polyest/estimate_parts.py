@@ -82,7 +82,8 @@ class ChannelEstimate:
     #: Samples taken into account.
     samples: int
     #: Σ (z − y)²/R at `map`; about `samples`, less the number of parameters fitted to them, when
-    #: model and noise are right.
+    #: model and noise are right. Where outliers are handled, each counts as one unless there are
+    #: too many of them to be gross errors.
     chi_squared: float
     #: Root mean square of the noise, assumed or estimated, in the output's unit.
     noise_std_dev: float

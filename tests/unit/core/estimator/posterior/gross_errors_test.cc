@@ -120,10 +120,10 @@ TEST_P(GrossErrorsOrMisfit, DoNotRaiseANoiseOfUnknownSize) {
       std_dev += estimate.parameters[1].posterior_std_dev / kRecords;
     }
     const double oracle = kNoise * std::sqrt(VarianceOfEstimate(GetParam(), share) / of_times);
-    // √Var[w u²]/E[w u²] = 1 of the samples that are no outliers, and their mean is about
-    // proportional to the scale: a scale is known to 1/√N, the
-    // mean over the records to 1/√(N · records). The bound is three times that, and what is left of
-    // a tenth, from which on a scale is revised.
+    // Of the samples that are no outliers √Var[w u²]/E[w u²] is 1, and their mean is about
+    // proportional to the scale. So a scale is known to 1/√N, and the mean over the records to
+    // 1/√(N · records). The bound is three times that, and what is left of a tenth, from which on a
+    // scale is revised.
     const double known = 1 / std::sqrt(kSamples * kRecords);
     EXPECT_NEAR(noise / kNoise, ScaleOfEstimate(GetParam(), share), 3 * known + 0.03) << share;
     EXPECT_NEAR(std_dev / oracle, 1, 0.1) << share;
