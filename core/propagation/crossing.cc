@@ -1,6 +1,7 @@
 #include "core/propagation/crossing.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace polyest::internal {
 namespace {
@@ -35,6 +36,13 @@ double FirstPositive(const StepSamples& b, double from, double length, int depth
   return found >= 0 ? found : FirstPositive(right, from + length / 2, length / 2, depth - 1);
 }
 
+Crossing FirstPositiveSample(const StepSamples& samples, bool from_zero) {
+  for (size_t i = from_zero ? 1 : 0; i < samples.size(); ++i) {
+    if (samples[i] > 0) return {.found = true, .theta = kTheta[i], .slope = 0};
+  }
+  return {};
+}
+
 }  // namespace
 
 double Interpolate(const StepSamples& samples, double theta) {
@@ -50,6 +58,9 @@ double Interpolate(const StepSamples& samples, double theta) {
 }
 
 Crossing FirstCrossing(const StepSamples& samples, bool from_zero) {
+  if (!std::ranges::all_of(samples, [](double sample) { return std::isfinite(sample); })) {
+    return FirstPositiveSample(samples, from_zero);
+  }
   StepSamples values = samples;
   if (from_zero) {
     // (φ(θ) − φ(0))/θ, whose value at 0 is extrapolated by the cubic polynomial through the others.

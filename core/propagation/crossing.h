@@ -20,7 +20,8 @@ struct Crossing {
 // positive at the start only if it is positive throughout the samples that follow.
 //
 // The polynomial is taken in Bernstein's form. It lies in the convex hull of its coefficients, so
-// that no crossing is missed, however short the time between it and the crossing back.
+// that no crossing is missed, however short the time between it and the crossing back. Where a
+// sample is not finite there is no polynomial; the first sample that is positive counts then.
 Crossing FirstCrossing(const StepSamples& samples, bool from_zero);
 
 // Returns the value at θ of the polynomial of degree 4 through the samples.

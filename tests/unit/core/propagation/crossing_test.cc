@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 
 namespace polyest::internal {
 namespace {
@@ -58,6 +59,17 @@ TEST(FirstCrossing, DoesNotTakeTheStartOnTheSurfaceForOne) {
     ASSERT_TRUE(wrong_way.found);
     EXPECT_EQ(wrong_way.theta, 0);
   }
+}
+
+TEST(FirstCrossing, IsAtASampleWhereSomeAreNotFinite) {
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  constexpr double kInf = std::numeric_limits<double>::infinity();
+  const Crossing crossing = FirstCrossing({kNan, -kInf, 1, kInf, kInf}, false);
+  EXPECT_TRUE(crossing.found);
+  EXPECT_EQ(crossing.theta, 0.5);
+  EXPECT_TRUE(std::isfinite(crossing.slope));
+  EXPECT_EQ(FirstCrossing({kInf, kInf, 1, 1, 1}, true).theta, 0.25);
+  EXPECT_FALSE(FirstCrossing({kNan, kNan, kNan, kNan, -1}, false).found);
 }
 
 TEST(Interpolate, IsExactForDegreeFour) {
