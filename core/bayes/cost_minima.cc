@@ -58,7 +58,8 @@ class NewtonSearch {
       const double slope = gradient.dot(*move);
       if ((move->array().abs() <= same_.array()).all() || -slope <= kRounding * std::abs(value)) {
         // Along a flat direction the last step may be long.
-        const Vector next = eta + *move;
+        Vector next = eta + *move;
+        PutOnSides(next);
         const double most = value + kRounding * std::abs(value);
         if (limits_.Allow(next) && cost_.Evaluate(next).total <= most) eta = next;
         if (multipliers_.size() == 0 || multipliers_.minCoeff() >= 0) return eta;
@@ -75,13 +76,22 @@ class NewtonSearch {
  private:
   // Makes those limits active that the start has reached and beyond which the cost falls: without
   // them the Hessian need not be positive definite at a minimum.
-  void KeepTo(const Vector& eta, const Vector& gradient) {
+  void KeepTo(Vector& eta, const Vector& gradient) {
     const Vector room = limits_.bounds - limits_.normals.transpose() * eta;
     const Vector slope = limits_.normals.transpose() * gradient;
     for (Eigen::Index i = 0; i < room.size(); ++i) {
       if (room[i] <= kReached * (1 + std::abs(limits_.bounds[i])) && slope[i] < 0) {
         active_.push_back(i);
       }
+    }
+    PutOnSides(eta);
+  }
+
+  // Makes a point that rounding has moved off the active sides of the box lie on them exactly.
+  void PutOnSides(Vector& eta) const {
+    const Eigen::Index n = eta.size();
+    for (const Eigen::Index i : active_) {
+      if (i < 2 * n) eta[i % n] = i < n ? limits_.bounds[i] : -limits_.bounds[i];
     }
   }
 
@@ -127,6 +137,7 @@ class NewtonSearch {
       if (cost_.Evaluate(next).total <= value + kSufficient * fraction * slope) {
         eta = next;
         if (limit && halving == 0) active_.push_back(*limit);
+        PutOnSides(eta);
         return true;
       }
     }
