@@ -9,6 +9,7 @@ namespace polyest::internal {
 namespace {
 
 constexpr double kJumpProbability = 0.1;  // of a move with γ = 1
+constexpr double kInLogs = 0.5;           // probability that a half moves in u
 constexpr double kStepSpread = 0.5;       // standard deviation of log γ
 constexpr double kJitter = 1e-6;          // keeps the moves irreducible, in box widths
 
@@ -16,7 +17,11 @@ constexpr double kJitter = 1e-6;          // keeps the moves irreducible, in box
 
 DifferentialEvolution::DifferentialEvolution(const Cost& cost, const Vector& lower,
                                              const Vector& upper, uint64_t seed)
-    : cost_(cost), lower_(lower), upper_(upper), generator_(seed) {}
+    : cost_(cost),
+      lower_(lower),
+      upper_(upper),
+      generator_(seed),
+      logs_(cost.prior(), cost.region()) {}
 
 void DifferentialEvolution::Evaluate(const Matrix& etas, Vector& costs) const {
   // Points outside, many where a posterior leans on bounds, are not evaluated at all.
@@ -52,35 +57,60 @@ bool DifferentialEvolution::IsInBox(const Matrix& etas, Eigen::Index row) const 
 void DifferentialEvolution::Sweep(double beta, Eigen::Index first, Eigen::Index count,
                                   Particles& particles) {
   const Eigen::Index half = count / 2;
-  MoveHalf(beta, first, half, first + half, count - half, particles);
-  MoveHalf(beta, first + half, count - half, first, half, particles);
+  MoveHalf(beta, {first, half, first + half, count - half}, particles);
+  MoveHalf(beta, {first + half, count - half, first, half}, particles);
 }
 
-void DifferentialEvolution::MoveHalf(double beta, Eigen::Index first, Eigen::Index count,
-                                     Eigen::Index other, Eigen::Index other_count,
-                                     Particles& particles) {
-  const Eigen::Index n = particles.etas.cols();
-  const double scale = 2.38 / std::sqrt(2.0 * static_cast<double>(n));
-  proposal_.resize(count, n);
-  for (Eigen::Index i = 0; i < count; ++i) {
-    const bool jump = Uniform() < kJumpProbability;
-    const double gamma = jump ? 1 : scale * std::exp(kStepSpread * normal_(generator_));
-    const Eigen::Index j = other + Draw(other_count);
-    const Eigen::Index k = other + Draw(other_count);
+void DifferentialEvolution::MoveHalf(double beta, const Halves& halves, Particles& particles) {
+  if (logs_.curved() && Uniform() < kInLogs) {
+    ProposeInLogs(halves, particles.etas);
+  } else {
+    Propose(halves, particles.etas);
+  }
+  Evaluate(proposal_, proposal_costs_);
+  for (Eigen::Index i = 0; i < halves.count; ++i) {
+    double& cost = particles.costs[halves.first + i];
+    const double change = beta * (proposal_costs_[i] - cost) - volume_changes_[i];
+    if (change <= 0 || std::log(Uniform()) < -change) {
+      particles.etas.row(halves.first + i) = proposal_.row(i);
+      cost = proposal_costs_[i];
+    }
+  }
+}
+
+void DifferentialEvolution::Propose(const Halves& halves, const Matrix& etas) {
+  const Eigen::Index n = etas.cols();
+  proposal_.resize(halves.count, n);
+  volume_changes_.setZero(halves.count);
+  for (Eigen::Index i = 0; i < halves.count; ++i) {
+    const double gamma = Factor(n);
+    const Eigen::Index j = halves.other + Draw(halves.other_count);
+    const Eigen::Index k = halves.other + Draw(halves.other_count);
     for (Eigen::Index d = 0; d < n; ++d) {
-      proposal_(i, d) = particles.etas(first + i, d) +
-                        gamma * (particles.etas(j, d) - particles.etas(k, d)) +
+      proposal_(i, d) = etas(halves.first + i, d) + gamma * (etas(j, d) - etas(k, d)) +
                         kJitter * (upper_[d] - lower_[d]) * normal_(generator_);
     }
   }
-  Evaluate(proposal_, proposal_costs_);
-  for (Eigen::Index i = 0; i < count; ++i) {
-    const double change = proposal_costs_[i] - particles.costs[first + i];
-    if (change <= 0 || std::log(Uniform()) < -beta * change) {
-      particles.etas.row(first + i) = proposal_.row(i);
-      particles.costs[first + i] = proposal_costs_[i];
-    }
+}
+
+void DifferentialEvolution::ProposeInLogs(const Halves& halves, const Matrix& etas) {
+  logs_.FromLocal(etas.middleRows(halves.first, halves.count), us_, volumes_);
+  logs_.FromLocal(etas.middleRows(halves.other, halves.other_count), other_us_, other_volumes_);
+  moved_us_.resize(halves.count, etas.cols());
+  for (Eigen::Index i = 0; i < halves.count; ++i) {
+    const double gamma = Factor(etas.cols());
+    const Eigen::Index j = Draw(halves.other_count);
+    const Eigen::Index k = Draw(halves.other_count);
+    moved_us_.row(i) = us_.row(i) + gamma * (other_us_.row(j) - other_us_.row(k));
   }
+  logs_.ToLocal(moved_us_, proposal_, moved_volumes_);
+  volume_changes_ = moved_volumes_ - volumes_;
+}
+
+double DifferentialEvolution::Factor(Eigen::Index dimension) {
+  if (Uniform() < kJumpProbability) return 1;
+  const double scale = 2.38 / std::sqrt(2.0 * static_cast<double>(dimension));
+  return scale * std::exp(kStepSpread * normal_(generator_));
 }
 
 Eigen::Index DifferentialEvolution::Draw(Eigen::Index count) {

@@ -5,6 +5,10 @@
 //   η_i + γ (η_j − η_k),   γ = 2.38/√(2n) times a lognormal factor, now and then γ = 1
 // to jump between modes, accepted by Metropolis' rule. Differences within one half of a population
 // move the other half, which leaves the density invariant although a whole half moves at once.
+//
+// Every other half, by chance, moves so in the coordinates u in which products and ratios of
+// parameters are straight (log_coordinates.h), with the density ∝ e^{−βJ} |dη/du| there:
+// differences do not point along a ridge that is curved.
 
 #include <absl/random/gaussian_distribution.h>
 
@@ -12,6 +16,7 @@
 #include <random>
 
 #include "core/bayes/cost.h"
+#include "core/bayes/log_coordinates.h"
 #include "core/common/types.h"
 
 namespace polyest::internal {
@@ -38,8 +43,16 @@ class DifferentialEvolution {
 
  private:
   bool IsInBox(const Matrix& etas, Eigen::Index row) const;
-  void MoveHalf(double beta, Eigen::Index first, Eigen::Index count, Eigen::Index other,
-                Eigen::Index other_count, Particles& particles);
+  // The rows [first, first + count) move by differences of the rows [other, other + other_count).
+  struct Halves {
+    Eigen::Index first, count, other, other_count;
+  };
+  void MoveHalf(double beta, const Halves& halves, Particles& particles);
+  // Write the points to which the half might move into `proposal_`. The second one does so by way
+  // of u and writes the changes of log |dη/du| into `volume_changes_`.
+  void Propose(const Halves& halves, const Matrix& etas);
+  void ProposeInLogs(const Halves& halves, const Matrix& etas);
+  double Factor(Eigen::Index dimension);  // γ
 
   const Cost& cost_;
   const Vector& lower_;
@@ -48,8 +61,11 @@ class DifferentialEvolution {
   std::uniform_real_distribution<double> uniform_{0, 1};
   // By the ziggurat method, in a third of the time of std::normal_distribution.
   absl::gaussian_distribution<double> normal_{0, 1};
+  const LogCoordinates logs_;
   Matrix proposal_;
   Vector proposal_costs_;
+  Matrix us_, moved_us_, other_us_;
+  Vector volumes_, moved_volumes_, other_volumes_, volume_changes_;
 };
 
 }  // namespace polyest::internal

@@ -108,19 +108,21 @@ Vector Prior::ToGerm(const ConstVectorRef& theta) const {
 
 // Computes ∂θ/∂ξ = diag(t′) F with t_i′ = dθ_i/dx_i · φ(z_i)/ρ_i(x_i), x_i the marginal germ of a
 // correlated parameter.
+double Prior::SlopeOfScore(int parameter, double z) const {
+  const UncertainParameter& marginal = parameters_[static_cast<size_t>(parameter)];
+  const double x = MarginalGerm(parameter, z);
+  const double slope = marginal.Slope(x);
+  const Germ& germ = marginal_germs_[static_cast<size_t>(parameter)];
+  if (!IsCorrelated(parameter) || germ.family() == GermFamily::kNormal) return slope;
+  // The slope is 0 so near a bound that x is rounded to it: θ does not change any more.
+  const double density = germ.Density(x);
+  return density > 0 ? slope * NormalDensity(z) / density : 0;
+}
+
 Matrix Prior::Jacobian(const ConstVectorRef& xi) const {
   const Vector z = ToScores(xi);
   Vector slope(dimension());
-  for (int i = 0; i < dimension(); ++i) {
-    const UncertainParameter& marginal = parameters_[static_cast<size_t>(i)];
-    const double x = MarginalGerm(i, z[i]);
-    slope[i] = marginal.Slope(x);
-    const Germ& germ = marginal_germs_[static_cast<size_t>(i)];
-    if (!IsCorrelated(i) || germ.family() == GermFamily::kNormal) continue;
-    // The slope is 0 so near a bound that x is rounded to it: θ does not change any more.
-    const double density = germ.Density(x);
-    slope[i] *= density > 0 ? NormalDensity(z[i]) / density : 0;
-  }
+  for (int i = 0; i < dimension(); ++i) slope[i] = SlopeOfScore(i, z[i]);
   return slope.asDiagonal() * factor_;
 }
 

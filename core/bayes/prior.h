@@ -43,10 +43,11 @@ class Prior {
   Vector ToGerm(const ConstVectorRef& theta) const;
   Matrix Jacobian(const ConstVectorRef& xi) const;  // ∂θ/∂ξ, n × n
 
-  Vector ToScores(const ConstVectorRef& xi) const;    // z = F ξ
-  Vector OfScores(const ConstVectorRef& z) const;     // ξ = F⁻¹ z
-  double OfScore(int parameter, double z) const;      // θ_i = t_i(z_i)
-  double ScoreOf(int parameter, double theta) const;  // its inverse, as ToGerm
+  Vector ToScores(const ConstVectorRef& xi) const;     // z = F ξ
+  Vector OfScores(const ConstVectorRef& z) const;      // ξ = F⁻¹ z
+  double OfScore(int parameter, double z) const;       // θ_i = t_i(z_i)
+  double ScoreOf(int parameter, double theta) const;   // its inverse, as ToGerm
+  double SlopeOfScore(int parameter, double z) const;  // t_i′(z_i)
   // Returns the value x of the parameter's own germ, θ_i = parameters()[i].ToParameter(x); it is z
   // for a parameter that is not correlated.
   double MarginalGerm(int parameter, double z) const;

@@ -47,16 +47,16 @@ class Assessment {
     POLYEST_ASSIGN_OR_RETURN(
         posterior_, DrawPosterior(cost, design_, *request_.guesses, request_.effort, stop));
     MixtureShare share;
+    findings_.not_mixed = WhyNotMixed(posterior_);
     NoteLeaning();
     if (request_.weigh) share = ShareOf(*request_.expansion, cost, posterior_);
-    const std::vector<Minimum>& minima = posterior_.minima;
     const Vector eta = MinimumAsStated(cost, stop);
     std::optional<double> log_evidence;
     if (request_.effort.evidence) {
       log_evidence = LogModelEvidence(problem_, *request_.expansion, cost, posterior_, eta);
     }
-    NoteMinimum(minima.front(), eta);
-    findings_.other_minima = OtherMinima(cost, design_, prior_, minima);
+    NoteMinimum(posterior_.minima.front(), eta);
+    findings_.other_minima = OtherMinima(cost, design_, prior_, posterior_.minima, stop);
     Summarize(cost, eta);
     POLYEST_ASSIGN_OR_RETURN(
         noise_widening_, MarginalizeNoise(problem_, *request_.expansion, cost, *request_.guesses,

@@ -227,6 +227,15 @@ void AddMinima(const Findings& findings, std::vector<Diagnostic>& diagnostics) {
                            absl::StrFormat("the minimizer gave up before it had converged: %s",
                                            findings.minimizer_reason)});
   }
+  if (!findings.not_mixed.empty()) {
+    diagnostics.push_back(
+        {DiagnosticCode::kNotConverged,
+         absl::StrFormat(
+             "the Markov chains have not mixed, and what they say of the posterior may "
+             "be wrong: %s; narrower priors of those parameters that the data tell only "
+             "together would help",
+             findings.not_mixed)});
+  }
 }
 
 std::string_view RemedyForInaccuracy(const ExpansionOptions& expansion) {

@@ -37,7 +37,8 @@ struct Findings {
   bool CarriesError() const;
   // Whether parameter i must not be called identified.
   bool IsDoubtful(int i) const {
-    return postponed.any() || power < 1 || windows.doubtful[static_cast<size_t>(i)];
+    return postponed.any() || power < 1 || !not_mixed.empty() ||
+           windows.doubtful[static_cast<size_t>(i)];
   }
   // Whether the standard deviation of parameter i is the draws', which the curvature contradicts.
   bool GoesByDraws(int i) const {
@@ -52,6 +53,7 @@ struct Findings {
   Vector map_xi;                // the minimum, germ coordinates
   bool converged = true;
   std::string minimizer_reason;
+  std::string not_mixed;             // why the posterior's Markov chains cannot be trusted, if so
   std::vector<Vector> other_minima;  // θ of other minima with comparable cost
   double left_out = 0;               // share of mixture components dropped for lack of room
   double shift = 0;                  // bound on the error of a mean, in standard deviations

@@ -1,8 +1,11 @@
 #include "core/estimator/posterior/other_minima.h"
 
 #include <algorithm>
+#include <optional>
 
 #include "core/common/linear_algebra.h"
+#include "core/estimator/expansion/search_domain.h"
+#include "core/estimator/posterior/cost_slice.h"
 
 namespace polyest::internal {
 namespace {
@@ -15,6 +18,7 @@ constexpr double kIsolatedCurvature = 1;
 // ripples that are lower.
 constexpr double kRidge = 0.5;
 constexpr int kPointsBetween = 15;
+constexpr int kSlices = 15;
 
 bool IsIsolated(const Cost& cost, const Region& region, const Prior& prior, const Vector& eta) {
   const Vector unit = prior.GermStandardDeviation();
@@ -23,27 +27,53 @@ bool IsIsolated(const Cost& cost, const Region& region, const Prior& prior, cons
   return SymmetricEigenvalues(scaled).minCoeff() > kIsolatedCurvature;
 }
 
-// Whether the cost rises on the straight way between two minima.
-bool AreSeparate(const Cost& cost, const Minimum& one, const Minimum& other) {
-  const double higher = std::max(one.value, other.value);
+// Returns the greatest cost on the straight way between two points.
+double HighestBetween(const Cost& cost, const Vector& from, const Vector& to) {
+  double highest = -kInfinity;
   for (int i = 1; i <= kPointsBetween; ++i) {
     const double part = i / (kPointsBetween + 1.0);
-    const Vector between = (1 - part) * one.point + part * other.point;
-    if (cost.Evaluate(between).total > higher + kRidge) return true;
+    highest = std::max(highest, cost.Evaluate((1 - part) * from + part * to).total);
   }
-  return false;
+  return highest;
+}
+
+// Whether the cost stays below `most` on a way between two minima that follows a valley which may
+// be curved: from one slice across the straight way to the next, each point is the least of its
+// slice that a search reaches from the point before.
+bool IsValleyBetween(const Cost& cost, const MinimizationProblem& search, const Vector& from,
+                     const Vector& to, double most, const Stop& stop) {
+  const Vector way = to - from;
+  const CostSlice slice(search, way);
+  Vector here = from;
+  for (int i = 1; i <= kSlices + 1; ++i) {
+    Vector next = to;
+    if (i <= kSlices) {
+      const double offset = way.dot(from) + i / (kSlices + 1.0) * way.squaredNorm();
+      const std::optional<Minimum> least = slice.Minimize(offset, {here}, stop);
+      if (!least) return false;
+      next = least->point;
+    }
+    if (!(HighestBetween(cost, here, next) <= most)) return false;
+    here = next;
+  }
+  return true;
 }
 
 }  // namespace
 
 std::vector<Vector> OtherMinima(const Cost& cost, const ExpansionDesign& design, const Prior& prior,
-                                const std::vector<Minimum>& minima) {
+                                const std::vector<Minimum>& minima, const Stop& stop) {
+  const MinimizationProblem search = SearchOf(cost, design);
+  const Minimum& best = minima.front();
   std::vector<Vector> others;
   for (size_t i = 1; i < minima.size(); ++i) {
-    if (minima[i].value - minima[0].value > kComparableCost || !minima[i].converged) continue;
-    if (!AreSeparate(cost, minima[i], minima[0])) continue;
-    if (!IsIsolated(cost, design.region, prior, minima[i].point)) continue;
-    others.push_back(prior.ToParameters(design.region.ToGerm(minima[i].point)));
+    const Minimum& other = minima[i];
+    if (other.value - best.value > kComparableCost || !other.converged) continue;
+    const double most = other.value + kRidge;
+    if (HighestBetween(cost, best.point, other.point) <= most) continue;
+    if (!IsIsolated(cost, design.region, prior, other.point)) continue;
+    if (IsValleyBetween(cost, search, best.point, other.point, most, stop)) continue;
+    others.push_back(prior.ToParameters(design.region.ToGerm(other.point)));
   }
   return others;
 }

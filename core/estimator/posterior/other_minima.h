@@ -12,8 +12,9 @@
 namespace polyest::internal {
 
 // Returns the parameters θ at those of the distinct `minima` (lowest first) that have a cost
-// comparable with the first one's, are isolated, and lie behind a ridge of the cost.
+// comparable with the first one's, are isolated, and lie behind a ridge of the cost, to which no
+// valley leads around. A stop request leaves those in which it is not known whether one does.
 std::vector<Vector> OtherMinima(const Cost& cost, const ExpansionDesign& design, const Prior& prior,
-                                const std::vector<Minimum>& minima);
+                                const std::vector<Minimum>& minima, const Stop& stop);
 
 }  // namespace polyest::internal

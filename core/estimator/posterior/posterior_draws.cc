@@ -1,5 +1,8 @@
 #include "core/estimator/posterior/posterior_draws.h"
 
+#include <absl/strings/str_format.h>
+#include <absl/strings/str_join.h>
+
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -27,6 +30,9 @@ constexpr int kStarts = 6;
 // random draws.
 constexpr int kCoverPerPoint = 4;
 constexpr double kMinEffectiveCover = 0.15;
+// Limits for chains, of Vehtari et al.
+constexpr double kMaxRHat = 1.01;
+constexpr double kMinEffectiveSize = 400;
 
 class Drawing {
  public:
@@ -145,6 +151,21 @@ Matrix PosteriorDraws::Germs(const Prior& prior) const {
     xis.row(i) = prior.OfScores(scores.row(i).transpose()).transpose();
   }
   return xis;
+}
+
+std::string WhyNotMixed(const PosteriorDraws& draws) {
+  if (draws.r_hat.size() == 0) return "";
+  std::vector<std::string> failed;
+  const double r_hat = draws.r_hat.maxCoeff(), effective_size = draws.effective_size.minCoeff();
+  if (!(r_hat <= kMaxRHat)) {
+    failed.push_back(absl::StrFormat("R̂ is %.3f and should be at most %.2f", r_hat, kMaxRHat));
+  }
+  if (!(effective_size >= kMinEffectiveSize)) {
+    failed.push_back(
+        absl::StrFormat("the draws are worth %.0f independent ones and should be worth %d",
+                        effective_size, static_cast<int>(kMinEffectiveSize)));
+  }
+  return absl::StrJoin(failed, ", and ");
 }
 
 void Reweigh(const ConstVectorRef& log_factors, PosteriorDraws& draws) {

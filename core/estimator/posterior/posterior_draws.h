@@ -7,6 +7,7 @@
 
 #include <absl/status/statusor.h>
 
+#include <string>
 #include <vector>
 
 #include "core/bayes/cost.h"
@@ -40,6 +41,10 @@ struct PosteriorDraws {
   Vector Parameter(const Prior& prior, int i) const;  // returns the draws of θ_i
   Matrix Germs(const Prior& prior) const;             // returns the draws of ξ, draws × n
 };
+
+// Returns why the Markov chains cannot be trusted, by the criteria of Vehtari et al.
+// (bayes/convergence.h); empty if they can, and for importance sampling.
+std::string WhyNotMixed(const PosteriorDraws& draws);
 
 // Multiplies the weights by factors whose logarithms are given, up to a common constant.
 void Reweigh(const ConstVectorRef& log_factors, PosteriorDraws& draws);

@@ -174,6 +174,7 @@ Assessed Combine(const std::vector<Assessed>& components, const std::vector<doub
         std::max(whole.findings.population_shift, findings.population_shift);
     whole.findings.carried_shift = std::max(whole.findings.carried_shift, findings.carried_shift);
     whole.findings.power = std::min(whole.findings.power, findings.power);
+    if (whole.findings.not_mixed.empty()) whole.findings.not_mixed = findings.not_mixed;
     whole.findings.leans = whole.findings.leans || findings.leans;
     whole.findings.postponed.Include(findings.postponed);
     if (!findings.converged && whole.findings.converged) {

@@ -1,6 +1,5 @@
 #include "core/estimator/studies/posterior_study.h"
 
-#include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 #include <absl/strings/str_join.h>
 
@@ -19,8 +18,6 @@ constexpr double kChainEffectiveSize = 60'000;
 constexpr int kMaxSweeps = 2'000;
 // Number of importance points for each returned sample; hardly any point is then returned twice.
 constexpr int kPointsPerSample = 4;
-constexpr double kMaxRHat = 1.01;
-constexpr double kMinEffectiveSize = 400;
 
 // Returns the index of the parameter, or −1 if there is none of that name.
 int Find(const Prior& prior, const std::string& name) {
@@ -43,25 +40,6 @@ absl::Status CheckJoint(const Prior& prior, size_t index,
         absl::StrFormat("%s is given twice; a pair is of two parameters", joint.first));
   }
   return absl::OkStatus();
-}
-
-// Applies the criteria of Vehtari et al. (bayes/convergence.h).
-void AddNotConverged(Posterior& posterior) {
-  if (posterior.method != PosteriorMethod::kMarkovChains) return;
-  std::vector<std::string> failed;
-  if (!(posterior.r_hat <= kMaxRHat)) {
-    failed.push_back(
-        absl::StrFormat("R̂ is %.3f and should be at most %.2f", posterior.r_hat, kMaxRHat));
-  }
-  if (!(posterior.effective_size >= kMinEffectiveSize)) {
-    failed.push_back(
-        absl::StrFormat("the draws are worth %.0f independent ones and should be worth %d",
-                        posterior.effective_size, static_cast<int>(kMinEffectiveSize)));
-  }
-  if (failed.empty()) return;
-  posterior.diagnostics.push_back(
-      {DiagnosticCode::kNotConverged,
-       absl::StrCat("the Markov chains have not mixed: ", absl::StrJoin(failed, ", and "))});
 }
 
 }  // namespace
@@ -138,7 +116,6 @@ Posterior DescribePosterior(const Assessed& assessed, const Prior& prior,
   posterior.effective_size = draws.effective_size.minCoeff();
   if (draws.r_hat.size() > 0) posterior.r_hat = draws.r_hat.maxCoeff();
   posterior.diagnostics = assessed.estimate.diagnostics;
-  AddNotConverged(posterior);
   posterior.log_evidence = assessed.log_evidence;
   posterior.time_s = assessed.estimate.time_s;
   posterior.sample_values = assessed.estimate.samples;

@@ -64,6 +64,21 @@ TEST(RunChains, WeighSeparatePieces) {
   EXPECT_LT(chains.r_hat[0], 1.02);
 }
 
+// Of a and b, both between 1 and 9, only the product is known: the posterior is a hyperbola, 10⁻⁴
+// as thick as it is long. There the density of a is ∝ 1/a, the thickness of the ridge along b.
+TEST(RunChains, MixAlongAProductThatIsKnown) {
+  const Prior prior({UncertainParameter::Uniform("a", 1, 9).value(),
+                     UncertainParameter::Uniform("b", 1, 9).value()});
+  const auto product = [](const Vector& xi) { return (5 + 4 * xi[0]) * (5 + 4 * xi[1]); };
+  const Cost cost = CostOf(prior, {{product, 9, 0.003}});
+  const Chains chains = RunOn(cost, 1);
+  EXPECT_LT(chains.r_hat.maxCoeff(), 1.01);
+  EXPECT_GE(chains.effective_size.minCoeff(), ChainOptions().effective_size);
+  const double mean = 8 / std::log(9);
+  const double std_dev = std::sqrt(40 / std::log(9) - mean * mean);
+  ExpectMean(chains, {(mean - 5) / 4, std_dev / 4});
+}
+
 // The pieces are so far apart and so narrow that no chain jumps between them. Each group of chains
 // has a piece of its own.
 TEST(RunChains, SayThatGroupsNeverMet) {

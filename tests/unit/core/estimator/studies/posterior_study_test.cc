@@ -6,12 +6,12 @@
 
 #include <cmath>
 
+#include "core/estimator/posterior/posterior_draws.h"
 #include "tests/unit/core/estimator/text_problem.h"
 
 namespace polyest::internal {
 namespace {
 
-using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
 // Measures y = a + 2b = 1.5 ± 0.3 with standard normal priors. The posterior is the Gaussian of
@@ -156,21 +156,16 @@ TEST(Estimate, SaysThatItIsNotGaussianAndByHowMuch) {
               ::testing::HasSubstr("that of a is 0."));
 }
 
-TEST(Posterior, SaysThatItsChainsHaveNotMixed) {
-  const Prior prior({UncertainParameter::Normal("a", 0, 1).value()});
-  Assessed assessed;
-  assessed.estimate.parameters.resize(1);
-  assessed.posterior.method = PosteriorMethod::kMarkovChains;
-  assessed.posterior.scores = Vector::LinSpaced(100, -1, 1);
-  assessed.posterior.weights = Vector::Constant(100, 0.01);
-  assessed.posterior.effective_size = Vector::Constant(1, 5000);
-  assessed.posterior.r_hat = Vector::Constant(1, 1.005);
-  EXPECT_THAT(DescribePosterior(assessed, prior, {}).diagnostics, IsEmpty());
-  assessed.posterior.r_hat[0] = 1.2;
-  const auto diagnostics = DescribePosterior(assessed, prior, {}).diagnostics;
-  ASSERT_THAT(diagnostics, SizeIs(1));
-  EXPECT_EQ(diagnostics[0].code, DiagnosticCode::kNotConverged);
-  EXPECT_THAT(diagnostics[0].message, ::testing::HasSubstr("R̂ is 1.200"));
+TEST(PosteriorDraws, KnowWhyTheirChainsHaveNotMixed) {
+  PosteriorDraws draws;
+  EXPECT_EQ(WhyNotMixed(draws), "");  // of importance sampling
+  draws.effective_size = Vector::Constant(2, 5000);
+  draws.r_hat = Vector::Constant(2, 1.005);
+  EXPECT_EQ(WhyNotMixed(draws), "");
+  draws.r_hat[1] = 1.2;
+  EXPECT_THAT(WhyNotMixed(draws), ::testing::HasSubstr("R̂ is 1.200"));
+  draws.effective_size[0] = 100;
+  EXPECT_THAT(WhyNotMixed(draws), ::testing::HasSubstr("worth 100 independent ones"));
 }
 
 TEST(PosteriorOptions, NameFieldValueAndRule) {
