@@ -47,6 +47,13 @@ void Cost::set_remainder(Vector coefficients) {
   remainder_constant_ = remainder_.dot(reference_phi_);
 }
 
+Cost Cost::AsStated() const {
+  Cost stated = *this;
+  stated.power_ = 1;
+  stated.prior_ = prior_.WithModesOfUniform();
+  return stated;
+}
+
 CostValue Cost::Evaluate(const ConstVectorRef& eta) const {
   CostValue value;
   const Vector d = BasisDifference(eta);

@@ -37,6 +37,9 @@ class Cost {
   // CostValue::mismatch.
   double power() const { return power_; }
   void set_power(double power) { power_ = power; }
+  // Returns the cost of the noise and the prior as they were stated: its power is 1, and its modes
+  // are those of uniform parameters whatever their germs.
+  Cost AsStated() const;
 
   // The number of threads, ≥ 1, on which EvaluateMany computes; its results do not depend on it.
   int threads() const { return threads_; }

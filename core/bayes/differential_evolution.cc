@@ -9,7 +9,6 @@ namespace polyest::internal {
 namespace {
 
 constexpr double kJumpProbability = 0.1;  // of a move with γ = 1
-constexpr double kInLogs = 0.5;           // probability that a half moves in u
 constexpr double kStepSpread = 0.5;       // standard deviation of log γ
 constexpr double kJitter = 1e-6;          // keeps the moves irreducible, in box widths
 
@@ -17,11 +16,12 @@ constexpr double kJitter = 1e-6;          // keeps the moves irreducible, in box
 
 DifferentialEvolution::DifferentialEvolution(const Cost& cost, const Vector& lower,
                                              const Vector& upper, uint64_t seed)
-    : cost_(cost),
-      lower_(lower),
-      upper_(upper),
-      generator_(seed),
-      logs_(cost.prior(), cost.region()) {}
+    : cost_(cost), lower_(lower), upper_(upper), generator_(seed) {
+  for (const ParameterMap map : {ParameterMap::kAffine, ParameterMap::kExponential}) {
+    const StraightCoordinates coordinates(cost.prior(), cost.region(), map);
+    if (coordinates.curved()) straight_.push_back(coordinates);
+  }
+}
 
 void DifferentialEvolution::Evaluate(const Matrix& etas, Vector& costs) const {
   // Points outside, many where a posterior leans on bounds, are not evaluated at all.
@@ -62,10 +62,12 @@ void DifferentialEvolution::Sweep(double beta, Eigen::Index first, Eigen::Index 
 }
 
 void DifferentialEvolution::MoveHalf(double beta, const Halves& halves, Particles& particles) {
-  if (logs_.curved() && Uniform() < kInLogs) {
-    ProposeInLogs(halves, particles.etas);
-  } else {
+  const Eigen::Index choice =
+      straight_.empty() ? 0 : Draw(static_cast<Eigen::Index>(straight_.size()) + 1);
+  if (choice == 0) {
     Propose(halves, particles.etas);
+  } else {
+    ProposeIn(straight_[static_cast<size_t>(choice - 1)], halves, particles.etas);
   }
   Evaluate(proposal_, proposal_costs_);
   for (Eigen::Index i = 0; i < halves.count; ++i) {
@@ -93,9 +95,11 @@ void DifferentialEvolution::Propose(const Halves& halves, const Matrix& etas) {
   }
 }
 
-void DifferentialEvolution::ProposeInLogs(const Halves& halves, const Matrix& etas) {
-  logs_.FromLocal(etas.middleRows(halves.first, halves.count), us_, volumes_);
-  logs_.FromLocal(etas.middleRows(halves.other, halves.other_count), other_us_, other_volumes_);
+void DifferentialEvolution::ProposeIn(const StraightCoordinates& coordinates, const Halves& halves,
+                                      const Matrix& etas) {
+  coordinates.FromLocal(etas.middleRows(halves.first, halves.count), us_, volumes_);
+  coordinates.FromLocal(etas.middleRows(halves.other, halves.other_count), other_us_,
+                        other_volumes_);
   moved_us_.resize(halves.count, etas.cols());
   for (Eigen::Index i = 0; i < halves.count; ++i) {
     const double gamma = Factor(etas.cols());
@@ -103,7 +107,7 @@ void DifferentialEvolution::ProposeInLogs(const Halves& halves, const Matrix& et
     const Eigen::Index k = Draw(halves.other_count);
     moved_us_.row(i) = us_.row(i) + gamma * (other_us_.row(j) - other_us_.row(k));
   }
-  logs_.ToLocal(moved_us_, proposal_, moved_volumes_);
+  coordinates.ToLocal(moved_us_, proposal_, moved_volumes_);
   volume_changes_ = moved_volumes_ - volumes_;
 }
 

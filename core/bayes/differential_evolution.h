@@ -6,17 +6,18 @@
 // to jump between modes, accepted by Metropolis' rule. Differences within one half of a population
 // move the other half, which leaves the density invariant although a whole half moves at once.
 //
-// Every other half, by chance, moves so in the coordinates u in which products and ratios of
-// parameters are straight (log_coordinates.h), with the density ∝ e^{−βJ} |dη/du| there:
-// differences do not point along a ridge that is curved.
+// By chance, halves move so in the coordinates u in which sums or products of parameters are
+// straight (straight_coordinates.h), with the density ∝ e^{−βJ} |dη/du| there: differences do not
+// point along a ridge that is curved.
 
 #include <absl/random/gaussian_distribution.h>
 
 #include <cstdint>
 #include <random>
+#include <vector>
 
 #include "core/bayes/cost.h"
-#include "core/bayes/log_coordinates.h"
+#include "core/bayes/straight_coordinates.h"
 #include "core/common/types.h"
 
 namespace polyest::internal {
@@ -51,7 +52,7 @@ class DifferentialEvolution {
   // Write the points to which the half might move into `proposal_`. The second one does so by way
   // of u and writes the changes of log |dη/du| into `volume_changes_`.
   void Propose(const Halves& halves, const Matrix& etas);
-  void ProposeInLogs(const Halves& halves, const Matrix& etas);
+  void ProposeIn(const StraightCoordinates& coordinates, const Halves& halves, const Matrix& etas);
   double Factor(Eigen::Index dimension);  // γ
 
   const Cost& cost_;
@@ -61,7 +62,7 @@ class DifferentialEvolution {
   std::uniform_real_distribution<double> uniform_{0, 1};
   // By the ziggurat method, in a third of the time of std::normal_distribution.
   absl::gaussian_distribution<double> normal_{0, 1};
-  const LogCoordinates logs_;
+  std::vector<StraightCoordinates> straight_;  // those that are curved in η
   Matrix proposal_;
   Vector proposal_costs_;
   Matrix us_, moved_us_, other_us_;

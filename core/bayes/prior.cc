@@ -1,5 +1,6 @@
 #include "core/bayes/prior.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -52,6 +53,19 @@ absl::StatusOr<Prior> Prior::Make(std::vector<UncertainParameter> parameters,
                                   const std::vector<Correlation>& correlations) {
   POLYEST_ASSIGN_OR_RETURN(const Matrix correlation, CorrelationMatrix(parameters, correlations));
   return Prior(std::move(parameters), correlation);
+}
+
+bool Prior::has_exponential_germs() const {
+  return std::ranges::any_of(
+      germs_, [](const Germ& germ) { return germ.family() == GermFamily::kExponential; });
+}
+
+Prior Prior::WithModesOfUniform() const {
+  Prior uniform = *this;
+  for (Germ& germ : uniform.germs_) {
+    if (germ.family() == GermFamily::kExponential) germ = Germ::Uniform();
+  }
+  return uniform;
 }
 
 bool Prior::IsCurved(int parameter) const {

@@ -31,6 +31,11 @@ class Prior {
 
   int dimension() const { return static_cast<int>(parameters_.size()); }
   const std::vector<UncertainParameter>& parameters() const { return parameters_; }
+  // Returns the prior with the exponential germs replaced by uniform ones. Where no data tell of a
+  // parameter, its J_apriori is constant, as that of a uniform θ: its mode is the mode of θ.
+  Prior WithModesOfUniform() const;
+  bool has_exponential_germs() const;
+
   std::vector<std::string> Names() const;  // of the parameters, in order
   // The germs of ξ_i and z_i: normal for a correlated parameter, whatever the germ of its marginal.
   const std::vector<Germ>& germs() const { return germs_; }

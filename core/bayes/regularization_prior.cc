@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "core/chaos/beta_gamma.h"
+#include "core/chaos/exponential.h"
 #include "core/chaos/truncated_normal.h"
 #include "core/common/check.h"
 
@@ -59,6 +60,8 @@ double LogNormalization(const Germ& germ, double regularization) {
       return 0.5 * ((1 - r) * kLogTwoPi - std::log(r)) + LogNormalProbability(root * a, root * b) -
              r * LogNormalProbability(a, b);
     }
+    case GermFamily::kExponential:
+      return r * LogExponentialNormalization(a) - LogExponentialNormalization(r * a);
   }
   POLYEST_CHECK(false);
 }
@@ -80,6 +83,8 @@ double WeightedVariance(const Germ& germ, double regularization) {
       return (1 + r * (a - 1)) / (r * r);
     case GermFamily::kTruncatedNormal:
       return std::min(1 / r, width * width / 12);
+    case GermFamily::kExponential:  // of the density ∝ e^{α² rate ξ}
+      return std::min(1 / (r * r * a * a), width * width / 12);
   }
   POLYEST_CHECK(false);
 }

@@ -11,6 +11,7 @@
 //                                                               a' = 1 + α² (a − 1), b' likewise
 //   gamma(s)          Γ(s)^{−α²} Γ(s')/(α²)^{s'}                gamma(s') ÷ α², s' = 1 + α² (s − 1)
 //   truncated normal  (√(2π) P)^{−α²} √(2π/α²) P'               N(0, 1/α²) cut to the same bounds
+//   exponential(r)    (2 sinh(r)/r)^{−α²} 2 sinh(α² r)/(α² r)   exponential(α² r)
 //
 // with c = 1/(2^{a+b−1} B(a, b)), P = ∫_a^b φ and P' = ∫ φ from √α² a to √α² b.
 
@@ -21,8 +22,9 @@ namespace polyest::internal {
 // Returns log Z_i; α² > 0.
 double LogNormalization(const Germ& germ, double regularization);
 
-// Returns the variance of ρ_i^{α²}/Z_i, α² > 0; for a truncated normal an upper bound, the smaller
-// of the variances of the normal and of the uniform density between its bounds.
+// Returns the variance of ρ_i^{α²}/Z_i, α² > 0; for a truncated normal and an exponential an upper
+// bound, the smaller of the variances of the density without bounds and of the uniform one between
+// them.
 double WeightedVariance(const Germ& germ, double regularization);
 
 // Returns Laplace's approximation of log Z_i about the germ's mode, α² > 0, with a curvature of at

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 #include "core/chaos/germ.h"
@@ -63,6 +64,11 @@ absl::Status CheckBounds(const char* family, double lower, double upper) {
 bool IsLogUniform(const UncertainParameter& parameter) {
   return parameter.map == ParameterMap::kExponential &&
          parameter.germ.family == GermFamily::kUniform;
+}
+
+bool IsUniformByLogarithm(const UncertainParameter& parameter) {
+  return parameter.map == ParameterMap::kExponential &&
+         parameter.germ.family == GermFamily::kExponential;
 }
 
 bool IsCutLognormal(const UncertainParameter& parameter) {
@@ -204,6 +210,7 @@ double UncertainParameter::Slope(double xi) const {
 double UncertainParameter::Mean() const {
   // The mean is E[e^(μ + σξ)] = e^μ sinh(σ)/σ for a uniform ξ.
   if (IsLogUniform(*this)) return std::exp(location) * std::sinh(scale) / scale;
+  if (IsUniformByLogarithm(*this)) return 0.5 * (ToParameter(-1) + ToParameter(1));
   if (IsCutLognormal(*this)) return std::exp(location) * CutMoment(*this, 1);
   // The mean is E[e^(μ + σξ)] = e^(μ + σ²/2).
   if (map == ParameterMap::kExponential) return std::exp(location + 0.5 * scale * scale);
@@ -218,6 +225,10 @@ double UncertainParameter::StandardDeviation() const {
     const double variance = scale < 0.01 ? square / 3 + 4 * square * square / 45
                                          : std::sinh(2 * scale) / (2 * scale) - mean * mean;
     return std::exp(location) * std::sqrt(variance);
+  }
+  // The range is 2 e^μ sinh σ.
+  if (IsUniformByLogarithm(*this)) {
+    return std::exp(location) * std::sinh(scale) / std::numbers::sqrt3;
   }
   if (IsCutLognormal(*this)) {
     const double mean = CutMoment(*this, 1);

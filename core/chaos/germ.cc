@@ -6,6 +6,7 @@
 #include <unsupported/Eigen/SpecialFunctions>
 
 #include "core/chaos/beta_gamma.h"
+#include "core/chaos/exponential.h"
 #include "core/chaos/truncated_normal.h"
 #include "core/common/check.h"
 
@@ -27,17 +28,23 @@ Germ::Germ(GermFamily family, double first_shape, double second_shape)
     case GermFamily::kGamma:  // 1 / Γ(shape)
       log_normalization_ = -LogGamma(first_shape_);
       break;
-    case GermFamily::kTruncatedNormal: {  // 1/(√(2π) ∫_a^b φ)
+    case GermFamily::kTruncatedNormal:  // 1/(√(2π) ∫_a^b φ)
       probability_ = NormalProbability(first_shape_, second_shape_);
       log_normalization_ = -0.5 * std::log(2 * std::numbers::pi) - std::log(probability_);
-      // a_0 is the mean, b_1 the variance.
-      const RecurrenceCoefficients moments =
-          TruncatedNormalRecurrence(first_shape_, second_shape_, 2);
-      mean_ = moments.a[0];
-      standard_deviation_ = std::sqrt(moments.b[1]);
+      TakeMoments();
       break;
-    }
+    case GermFamily::kExponential:
+      log_normalization_ = LogExponentialNormalization(first_shape_);
+      TakeMoments();
+      break;
   }
+}
+
+void Germ::TakeMoments() {
+  // a_0 is the mean, b_1 the variance.
+  const RecurrenceCoefficients moments = Recurrence(2);
+  mean_ = moments.a[0];
+  standard_deviation_ = std::sqrt(moments.b[1]);
 }
 
 Germ::Germ(const GermShape& shape) : Germ(shape.family, shape.first, shape.second) {}
@@ -61,12 +68,18 @@ Germ Germ::TruncatedNormal(double lower, double upper) {
   return Germ(GermFamily::kTruncatedNormal, lower, upper);
 }
 
+Germ Germ::Exponential(double rate) {
+  POLYEST_CHECK(rate > 0 && rate <= kMaxRate);
+  return Germ(GermFamily::kExponential, rate, 0);
+}
+
 double Germ::Lower() const {
   switch (family_) {
     case GermFamily::kNormal:
       return -kInfinity;
     case GermFamily::kUniform:
     case GermFamily::kBeta:
+    case GermFamily::kExponential:
       return -1;
     case GermFamily::kGamma:
       return 0;
@@ -78,7 +91,7 @@ double Germ::Lower() const {
 
 double Germ::Upper() const {
   if (family_ == GermFamily::kTruncatedNormal) return second_shape_;
-  return family_ == GermFamily::kUniform || family_ == GermFamily::kBeta ? 1 : kInfinity;
+  return family_ == GermFamily::kNormal || family_ == GermFamily::kGamma ? kInfinity : 1;
 }
 
 double Germ::Mean() const {
@@ -92,6 +105,7 @@ double Germ::Mean() const {
     case GermFamily::kGamma:
       return first_shape_;
     case GermFamily::kTruncatedNormal:
+    case GermFamily::kExponential:
       return mean_;
   }
   return 0;
@@ -109,6 +123,7 @@ double Germ::StandardDeviation() const {
     case GermFamily::kGamma:
       return std::sqrt(first_shape_);
     case GermFamily::kTruncatedNormal:
+    case GermFamily::kExponential:
       return standard_deviation_;
   }
   return 0;
@@ -126,6 +141,8 @@ double Germ::Mode() const {
       return first_shape_ - 1;
     case GermFamily::kTruncatedNormal:
       return std::clamp(0.0, first_shape_, second_shape_);
+    case GermFamily::kExponential:
+      return 1;
   }
   return 0;
 }
@@ -146,6 +163,8 @@ double Germ::LogDensity(double xi) const {
     case GermFamily::kGamma:
       if (std::isinf(xi)) return -kInfinity;
       return log_normalization_ + TimesLog(first_shape_ - 1, xi) - xi;
+    case GermFamily::kExponential:
+      return log_normalization_ + first_shape_ * xi;
   }
   return -kInfinity;
 }
@@ -161,6 +180,8 @@ double Germ::LogDensityDerivative(double xi) const {
       return (first_shape_ - 1) / (1 + xi) - (second_shape_ - 1) / (1 - xi);
     case GermFamily::kGamma:  // (shape − 1)/ξ − 1
       return (first_shape_ - 1) / xi - 1;
+    case GermFamily::kExponential:
+      return first_shape_;
   }
   return 0;
 }
@@ -171,6 +192,7 @@ double Germ::LogDensitySecondDerivative(double xi) const {
     case GermFamily::kTruncatedNormal:
       return -1;
     case GermFamily::kUniform:
+    case GermFamily::kExponential:
       return 0;
     case GermFamily::kBeta:  // −(α − 1)/(1 + ξ)² − (β − 1)/(1 − ξ)²
       return -(first_shape_ - 1) / ((1 + xi) * (1 + xi)) -
@@ -193,6 +215,8 @@ double Germ::CumulativeProbability(double xi) const {
       return LowerIncompleteGamma(first_shape_, xi);
     case GermFamily::kTruncatedNormal:
       return NormalProbability(first_shape_, std::min(xi, second_shape_)) / probability_;
+    case GermFamily::kExponential:
+      return ExponentialProbability(first_shape_, xi);
   }
   return 0;
 }
@@ -209,6 +233,8 @@ double Germ::UpperProbability(double xi) const {
       return UpperIncompleteGamma(first_shape_, xi);
     case GermFamily::kTruncatedNormal:
       return NormalProbability(std::max(xi, first_shape_), second_shape_) / probability_;
+    case GermFamily::kExponential:
+      return UpperExponentialProbability(first_shape_, xi);
   }
   return 0;
 }
@@ -225,6 +251,8 @@ double Germ::LowerQuantile(double probability) const {
       return LowerGammaQuantile(first_shape_, probability);
     case GermFamily::kTruncatedNormal:
       return TruncatedNormalQuantile(first_shape_, second_shape_, probability);
+    case GermFamily::kExponential:
+      return ExponentialQuantile(first_shape_, probability);
   }
   return 0;
 }
@@ -241,6 +269,8 @@ double Germ::UpperQuantile(double probability) const {
       return UpperGammaQuantile(first_shape_, probability);
     case GermFamily::kTruncatedNormal:
       return -TruncatedNormalQuantile(-second_shape_, -first_shape_, probability);
+    case GermFamily::kExponential:
+      return UpperExponentialQuantile(first_shape_, probability);
   }
   return 0;
 }
@@ -295,6 +325,7 @@ RecurrenceCoefficients Germ::Recurrence(int count) const {
   if (family_ == GermFamily::kTruncatedNormal) {
     return TruncatedNormalRecurrence(first_shape_, second_shape_, count);
   }
+  if (family_ == GermFamily::kExponential) return ExponentialRecurrence(first_shape_, count);
   for (int k = 0; k < count; ++k) {
     const double kk = k;
     if (family_ == GermFamily::kGamma) result.a[k] = 2 * kk + first_shape_;

@@ -7,6 +7,7 @@
 //   beta(α, β)      ∝ (1+ξ)^(α−1) (1−ξ)^(β−1) on [−1, 1]           Jacobi
 //   gamma(shape)    ξ^(shape−1) e^(−ξ) / Γ(shape) on [0, ∞)        Laguerre
 //   truncated normal(a, b)   N(0, 1) cut to [a, b]                 its own (truncated_normal.h)
+//   exponential(rate)        ∝ e^(rate ξ) on [−1, 1]               its own (exponential.h)
 //
 // α and β are the statistician's parameters: the paper's "Beta(1,1)" is Beta(2, 2) here.
 
@@ -46,9 +47,13 @@ class Germ {
   // The highest degree of a truncated normal's polynomials that Recurrence computes.
   static constexpr int kMaxTruncatedNormalOrder = 100;
 
+  // Requires 0 < rate ≤ kMaxRate, because its polynomials are accurate up to there.
+  static Germ Exponential(double rate);
+  static constexpr double kMaxRate = 5;
+
   GermFamily family() const { return family_; }
   operator GermShape() const { return {family_, first_shape_, second_shape_}; }
-  // α of beta, shape of gamma, lower bound of truncated normal, else 0
+  // α of beta, shape of gamma, lower bound of truncated normal, rate of exponential, else 0
   double first_shape() const { return first_shape_; }
   // β of beta, upper bound of truncated normal, else 0
   double second_shape() const { return second_shape_; }
@@ -82,6 +87,7 @@ class Germ {
 
  private:
   Germ(GermFamily family, double first_shape, double second_shape);
+  void TakeMoments();
   double UpperProbability(double xi) const;  // 1 − CumulativeProbability(ξ)
   // Quantiles counted from below and from above, 0 < probability ≤ ½.
   double LowerQuantile(double probability) const;
@@ -91,8 +97,9 @@ class Germ {
   double first_shape_;
   double second_shape_;
   double log_normalization_ = 0;  // log of the density's constant factor
-  // ∫_a^b φ and the moments of a truncated normal, which have no closed form free of cancellation.
-  double probability_ = 1;
+  double probability_ = 1;        // ∫_a^b φ of a truncated normal
+  // The moments of a truncated normal and an exponential, which have no closed form free of
+  // cancellation.
   double mean_ = 0;
   double standard_deviation_ = 1;
 };

@@ -6,6 +6,7 @@
 #include <unsupported/Eigen/SpecialFunctions>
 
 #include "core/chaos/gauss_rule.h"
+#include "core/chaos/stieltjes.h"
 #include "core/common/check.h"
 
 namespace polyest::internal {
@@ -33,22 +34,14 @@ double PanelProbability(double a, double b) {
   return (b - a) * sum;
 }
 
-// A discrete measure that integrates polynomials times the density: offsets x − start and weights
-// of sum 1.
-struct Discretization {
-  double start;
-  Eigen::ArrayXd offsets;
-  Eigen::ArrayXd weights;
-};
-
-Discretization Discretize(double a, double b, int nodes) {
+DiscreteMeasure Discretize(double a, double b, int nodes) {
   const GaussRule rule = MakeGaussRule(Germ::Uniform(), nodes);
   const double mode = std::clamp(0.0, a, b);
   const double start = std::max(a, mode - kReach);
   const double length = std::min(b, mode + kReach) - start;
   const int panels = static_cast<int>(std::ceil(length / kPanel));
   const double width = length / panels;
-  Discretization result{start, Eigen::ArrayXd(panels * nodes), Eigen::ArrayXd(panels * nodes)};
+  DiscreteMeasure result{start, Eigen::ArrayXd(panels * nodes), Eigen::ArrayXd(panels * nodes)};
   for (int panel = 0; panel < panels; ++panel) {
     const Eigen::ArrayXd offset = width * (panel + 0.5 * (1 + rule.nodes.array()));
     result.offsets.segment(panel * nodes, nodes) = offset;
@@ -90,25 +83,9 @@ double TruncatedNormalQuantile(double a, double b, double p) {
   return xi;
 }
 
-// Computes p_{k+1} √b_{k+1} = (ξ − a_k) p_k − √b_k p_{k−1} with a_k = ∫ ξ p_k² ρ and the b_{k+1}
-// that makes ∫ p_{k+1}² ρ = 1.
 RecurrenceCoefficients TruncatedNormalRecurrence(double a, double b, int count) {
   POLYEST_CHECK(a < b && count >= 1 && count <= Germ::kMaxTruncatedNormalOrder + 1);
-  const Discretization measure = Discretize(a, b, count + kNodesForDensity);
-  RecurrenceCoefficients result{Vector::Zero(count), Vector::Ones(count)};
-  Eigen::ArrayXd previous = Eigen::ArrayXd::Zero(measure.weights.size());
-  Eigen::ArrayXd present = Eigen::ArrayXd::Ones(measure.weights.size());
-  for (int k = 0; k < count; ++k) {
-    const double mean = (measure.weights * measure.offsets * present.square()).sum();
-    result.a[k] = measure.start + mean;
-    if (k + 1 == count) break;
-    Eigen::ArrayXd next = (measure.offsets - mean) * present;
-    if (k > 0) next -= std::sqrt(result.b[k]) * previous;
-    result.b[k + 1] = (measure.weights * next.square()).sum();
-    previous = std::move(present);
-    present = next / std::sqrt(result.b[k + 1]);
-  }
-  return result;
+  return StieltjesRecurrence(Discretize(a, b, count + kNodesForDensity), count);
 }
 
 }  // namespace polyest::internal

@@ -3,8 +3,7 @@
 // The standard normal density cut to [a, b]; either bound may be infinite.
 //   ρ(ξ) = φ(ξ)/Z on [a, b],  φ(ξ) = e^{−ξ²/2}/√(2π),  Z = ∫_a^b φ.
 //
-// Its orthogonal polynomials have no closed form. Stieltjes' procedure on a discrete measure finds
-// their recurrence (W. Gautschi, Orthogonal Polynomials, Oxford 2004, §2.2). The measure has
+// Its orthogonal polynomials have no closed form (stieltjes.h). Their discrete measure has
 // Gauss–Legendre nodes on panels of width ≤ 1, on each as many as the polynomials asked for and 20
 // more. That leaves 40 degrees for the density, whose Chebyshev coefficients on a panel are below
 // 10⁻¹⁶ of its size from degree 30 on wherever it is above 10⁻³⁰ of its maximum.

@@ -119,16 +119,16 @@ class Assessment {
     return cost;
   }
 
-  // Returns the minimum of the cost with the noise as stated, whatever the likelihood's power.
-  Vector MinimumAsStated(Cost cost, const Stop& stop) const {
+  // Returns the minimum of the cost as stated, whatever the likelihood's power.
+  Vector MinimumAsStated(const Cost& cost, const Stop& stop) const {
     const std::vector<Minimum>& minima = posterior_.minima;
-    if (cost.power() == 1) return minima.front().point;
-    cost.set_power(1);
+    if (cost.power() == 1 && !prior_.has_exponential_germs()) return minima.front().point;
+    const Cost stated = cost.AsStated();
     Matrix starts(static_cast<Eigen::Index>(minima.size()), cost.dimension());
     for (size_t i = 0; i < minima.size(); ++i) {
       starts.row(static_cast<Eigen::Index>(i)) = minima[i].point.transpose();
     }
-    return FindMinimaOf(cost, SearchOf(cost, design_), starts, stop).front().point;
+    return FindMinimaOf(stated, SearchOf(stated, design_), starts, stop).front().point;
   }
 
   void NoteLeaning() {
@@ -157,9 +157,7 @@ class Assessment {
     estimate_.time_s = record.time_s();
     estimate_.samples = record.samples();
     estimate_.regularization = regularization_;
-    Cost stated = cost;
-    stated.set_power(1);
-    estimate_.cost = stated.Evaluate(eta);
+    estimate_.cost = cost.AsStated().Evaluate(eta);
     const bool more_prior = problem_.ended_runs() != nullptr || problem_.population().has_value();
     if (!more_prior || !(regularization_ > 0)) return;
     // What the parameters of ended runs add when they are integrated out, and what a population

@@ -8,6 +8,7 @@
 
 #include "core/common/field_error.h"
 #include "core/common/status.h"
+#include "core/estimator/problem/logarithmic_germs.h"
 
 namespace polyest::internal {
 namespace {
@@ -62,7 +63,7 @@ absl::StatusOr<Prior> PriorOfRuns(const std::vector<UncertainParameter>& given,
                                   int first_run) {
   POLYEST_ASSIGN_OR_RETURN(std::vector<Correlation> all,
                            CorrelationsOfRuns(given, correlations, runs, first_run));
-  return Prior::Make(ParametersOfRuns(given, runs, first_run), std::move(all));
+  return Prior::Make(ByLogarithms(ParametersOfRuns(given, runs, first_run), all), all);
 }
 
 }  // namespace polyest::internal

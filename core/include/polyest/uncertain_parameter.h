@@ -7,9 +7,13 @@
 //
 // Lognormal, from its own mean m and standard deviation s:
 //   scale² = log(1 + s²/m²),  location = log m − scale²/2.
-// Estimates are modes of densities of ξ. For an affine θ this is also the mode of θ. For a
-// lognormal θ it is the value whose logarithm is most likely: for the prior, e^location, which is
-// the median and lies between mode and mean.
+// Where a uniform parameter is estimated together with lognormal or log-uniform ones, its germ is
+// that of its logarithm: θ = exp(location + scale ξ), ξ exponential of the rate `scale`. Products
+// and ratios, all that data often tell of a mass and a stiffness, are then straight lines in ξ.
+//
+// Estimates are modes of densities of ξ. For an affine θ and a uniform one this is also the mode of
+// θ. For a lognormal θ it is the value whose logarithm is most likely: for the prior, e^location,
+// which is the median and lies between mode and mean.
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
@@ -27,12 +31,14 @@ enum class GermFamily {
   kBeta,             // ∝ (1+ξ)^(α−1) (1−ξ)^(β−1) on [−1, 1]
   kGamma,            // ξ^(shape−1) e^(−ξ) / Γ(shape) on [0, ∞)
   kTruncatedNormal,  // N(0, 1) cut to [lower, upper]
+  kExponential,      // ∝ e^(rate ξ) on [−1, 1]; of the logarithm of a uniform parameter
 };
 
 // The density of a germ.
 struct GermShape {
   GermFamily family = GermFamily::kUniform;  // its kind
-  double first = 0;   // α of beta, shape of gamma, lower bound of truncated normal; else 0
+  // α of beta, shape of gamma, lower bound of truncated normal, rate of exponential; else 0
+  double first = 0;
   double second = 0;  // β of beta, upper bound of truncated normal; else 0
 };
 

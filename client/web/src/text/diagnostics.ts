@@ -16,7 +16,7 @@ const EXPLANATIONS: Record<string, Explanation> = {
   },
   NOT_CONVERGED: {
     title: 'Computation has not converged',
-    meaning: 'The search for the most probable values gave up, so that the estimates and verdicts may be wrong.',
+    meaning: 'The search for the most probable values gave up, or the chains that draw from the posterior have not mixed, so that the estimates and verdicts may be wrong.',
     remedy: 'Look at `polyest profile`: a flat or jagged cost says which parameter is the cause. Fix it, or give it a narrower prior.',
     severity: 'serious',
   },

@@ -23,7 +23,9 @@ const std::vector<Germ>& AllGerms() {
       // effect.
       Germ::TruncatedNormal(-1, 2.5), Germ::TruncatedNormal(-kInfinity, 0.3),
       Germ::TruncatedNormal(4.5, kInfinity), Germ::TruncatedNormal(0.4, 0.401),
-      Germ::TruncatedNormal(-9, kInfinity)};
+      Germ::TruncatedNormal(-9, kInfinity),
+      // nearly uniform, and nearly without its lower half
+      Germ::Exponential(1e-3), Germ::Exponential(1.2), Germ::Exponential(Germ::kMaxRate)};
   return germs;
 }
 

@@ -1,0 +1,65 @@
+#include "core/bayes/straight_coordinates.h"
+
+#include <cmath>
+
+namespace polyest::internal {
+namespace {
+
+// The quantiles of other correlated parameters would take longer than the cost itself.
+bool IsQuick(const Germ& own, const Germ& germ) {
+  return own == germ || own.family() == GermFamily::kNormal || own.family() == GermFamily::kUniform;
+}
+
+}  // namespace
+
+StraightCoordinates::StraightCoordinates(const Prior& prior, const Region& region, ParameterMap map)
+    : prior_(prior), region_(region), map_(map) {
+  for (int i = 0; i < prior.dimension(); ++i) {
+    const UncertainParameter& parameter = prior.parameters()[static_cast<size_t>(i)];
+    const Germ germ(parameter.germ);
+    const Germ& used = prior.germs()[static_cast<size_t>(i)];
+    if ((parameter.map == map && used == germ) || !IsQuick(germ, used)) continue;
+    const bool positive = parameter.ToParameter(germ.Lower()) >= 0;
+    const bool negative = parameter.ToParameter(germ.Upper()) <= 0;
+    if (map == ParameterMap::kExponential && !positive && !negative) continue;
+    curved_.push_back({i, negative ? -1.0 : 1.0});
+  }
+}
+
+void StraightCoordinates::FromLocal(const ConstMatrixRef& etas, Matrix& us,
+                                    Vector& log_volumes) const {
+  us = region_.ManyToGerm(etas);
+  if (prior_.correlated()) us = (us * prior_.factor().transpose()).eval();
+  log_volumes.setZero(us.rows());
+  for (const auto& [i, sign] : curved_) {
+    for (Eigen::Index row = 0; row < us.rows(); ++row) {
+      const double z = us(row, i);
+      const double theta = prior_.OfScore(i, z);
+      us(row, i) = map_ == ParameterMap::kExponential ? std::log(sign * theta) : theta;
+      log_volumes[row] += LogSlope(i, z, theta);
+    }
+  }
+}
+
+void StraightCoordinates::ToLocal(const ConstMatrixRef& us, Matrix& etas,
+                                  Vector& log_volumes) const {
+  Matrix xis = us;
+  log_volumes.setZero(us.rows());
+  for (const auto& [i, sign] : curved_) {
+    for (Eigen::Index row = 0; row < us.rows(); ++row) {
+      const double u = us(row, i);
+      const double theta = map_ == ParameterMap::kExponential ? sign * std::exp(u) : u;
+      xis(row, i) = prior_.ScoreOf(i, theta);
+      log_volumes[row] += LogSlope(i, xis(row, i), theta);
+    }
+  }
+  if (prior_.correlated()) xis = SolveLower(prior_.factor(), Matrix(xis.transpose())).transpose();
+  etas = region_.ManyToLocal(xis);
+}
+
+double StraightCoordinates::LogSlope(int parameter, double z, double theta) const {
+  const double slope = prior_.SlopeOfScore(parameter, z);
+  return std::log((map_ == ParameterMap::kExponential ? std::abs(theta) : 1) / slope);
+}
+
+}  // namespace polyest::internal
