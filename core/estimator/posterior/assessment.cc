@@ -15,6 +15,7 @@
 #include "core/estimator/expansion/search_domain.h"
 #include "core/estimator/posterior/channel_description.h"
 #include "core/estimator/posterior/diagnosis.h"
+#include "core/estimator/posterior/marginal_description.h"
 #include "core/estimator/posterior/misfit.h"
 #include "core/estimator/posterior/model_correction.h"
 #include "core/estimator/posterior/model_evidence.h"
@@ -203,11 +204,7 @@ class Assessment {
         parameter.verdict = Verdict::kWeak;
       }
       DescribeMarginal(posterior_, prior_, i, parameter);
-      const bool unknown = parameter.verdict == Verdict::kNotIdentified ||
-                           parameter.posterior_std_dev > parameter.prior_std_dev;
-      if (unknown && (findings_.power < 1 || findings_.shift > kInaccurateShift)) {
-        DescribeByPrior(i, parameter);
-      }
+      GoByPriorIfInaccurate(findings_, prior_, i, parameter);
       estimate_.parameters.push_back(std::move(parameter));
     }
     DescribeTradeOffs();
@@ -243,19 +240,6 @@ class Assessment {
       findings_.drawn_to_curvature[i] = ratio;
       deviation_[i] = drawn;
     }
-  }
-
-  // Sets what is known of parameter i to what its prior says: an expansion that is not accurate
-  // must not make it less, nor its draws tell what its curvature does not.
-  void DescribeByPrior(int i, ParameterEstimate& parameter) const {
-    const UncertainParameter& prior = prior_.parameters()[static_cast<size_t>(i)];
-    const Germ germ(prior.germ);
-    parameter.mean = parameter.prior_mean;
-    parameter.posterior_std_dev = parameter.std_dev = parameter.prior_std_dev;
-    parameter.lower95 = prior.ToParameter(germ.Quantile(0.025));
-    parameter.upper95 = prior.ToParameter(germ.Quantile(0.975));
-    parameter.contraction = 1;
-    parameter.verdict = Verdict::kNotIdentified;
   }
 
   void WidenForShift() {
@@ -380,16 +364,6 @@ class Assessment {
 };
 
 }  // namespace
-
-void DescribeMarginal(const PosteriorDraws& posterior, const Prior& prior, int i,
-                      ParameterEstimate& parameter) {
-  const Vector theta = posterior.Parameter(prior, i);
-  const WeightedQuantiles quantile(theta, posterior.weights);
-  parameter.mean = WeightedMean(theta, posterior.weights);
-  parameter.posterior_std_dev = WeightedStandardDeviation(theta, posterior.weights);
-  parameter.lower95 = quantile(0.025);
-  parameter.upper95 = quantile(0.975);
-}
 
 absl::StatusOr<Assessed> Assess(const AssessmentRequest& request, const Stop& stop) {
   return Assessment(request).Run(stop);

@@ -46,10 +46,6 @@ struct Assessed {
   std::optional<double> log_evidence;  // if asked for and there is one (model_evidence.h)
 };
 
-// Sets mean, posterior_std_dev and limits of parameter i.
-void DescribeMarginal(const PosteriorDraws& posterior, const Prior& prior, int i,
-                      ParameterEstimate& parameter);
-
 // Assesses an expansion. Returns an error only on a stop request.
 absl::StatusOr<Assessed> Assess(const AssessmentRequest& request, const Stop& stop);
 

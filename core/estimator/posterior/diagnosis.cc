@@ -247,7 +247,14 @@ std::string_view RemedyForInaccuracy(const ExpansionOptions& expansion) {
 void AddInaccuracy(const Findings& findings, const Estimate& estimate,
                    std::vector<Diagnostic>& diagnostics) {
   const std::string_view remedy = RemedyForInaccuracy(findings.problem->problem().expansion);
-  if (findings.power < 1) {
+  if (!findings.UsesData()) {
+    diagnostics.push_back(
+        {DiagnosticCode::kExpansionInaccurate,
+         absl::StrFormat("no expansion of order %d has followed the model to where the data ask "
+                         "for: the data tell nothing that could be relied upon, and what is "
+                         "reported is the prior; %s",
+                         estimate.expansion.order, remedy)});
+  } else if (findings.power < 1) {
     diagnostics.push_back(
         {DiagnosticCode::kExpansionInaccurate,
          absl::StrFormat(

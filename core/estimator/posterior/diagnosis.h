@@ -20,6 +20,8 @@ namespace polyest::internal {
 inline constexpr double kInaccurateShift = 0.25;
 // Ratio of the draws' and the curvature's standard deviations from which on they contradict.
 inline constexpr double kContradiction = 2;
+// Power of the likelihood below which the posterior is nothing but where the expansion was made.
+inline constexpr double kLeastUsed = 0.01;
 
 struct Findings {
   // Whether more of the shift is due to the integration than to the expansion.
@@ -35,6 +37,8 @@ struct Findings {
   // Whether sums were taken over with an error for which the record would have been propagated
   // again without a limit.
   bool CarriesError() const;
+  // Whether the expansion follows the model so far that the posterior tells of the data.
+  bool UsesData() const { return power >= kLeastUsed; }
   // Whether parameter i must not be called identified.
   bool IsDoubtful(int i) const {
     return postponed.any() || power < 1 || !not_mixed.empty() ||

@@ -7,6 +7,7 @@
 #include "core/bayes/identifiability.h"
 #include "core/common/status.h"
 #include "core/estimator/posterior/connected_elements.h"
+#include "core/estimator/posterior/marginal_description.h"
 #include "core/estimator/posterior/mixture_weighing.h"
 #include "core/estimator/posterior/model_evidence.h"
 
@@ -72,7 +73,8 @@ FilteredDraws MixFiltered(const std::vector<Assessed>& components) {
   return all;
 }
 
-void DescribeWhole(const Prior& prior, const PosteriorDraws& posterior, Estimate& estimate) {
+void DescribeWhole(const Prior& prior, const PosteriorDraws& posterior, const Findings& findings,
+                   Estimate& estimate) {
   for (int i = 0; i < prior.dimension(); ++i) {
     ParameterEstimate& parameter = estimate.parameters[static_cast<size_t>(i)];
     DescribeMarginal(posterior, prior, i, parameter);
@@ -81,6 +83,7 @@ void DescribeWhole(const Prior& prior, const PosteriorDraws& posterior, Estimate
         VerdictOfContraction(contraction) != Verdict::kIdentified) {
       parameter.verdict = Verdict::kWeak;
     }
+    GoByPriorIfInaccurate(findings, prior, i, parameter);
   }
 }
 
@@ -182,7 +185,7 @@ Assessed Combine(const std::vector<Assessed>& components, const std::vector<doub
       whole.findings.minimizer_reason = findings.minimizer_reason;
     }
   }
-  if (pieces.size() > 1) {
+  if (pieces.size() > 1 && whole.findings.UsesData()) {
     for (const Places& places : pieces) {
       whole.estimate.components.push_back(
           DescribePiece(components, weights, places, problem.prior()));
@@ -194,7 +197,7 @@ Assessed Combine(const std::vector<Assessed>& components, const std::vector<doub
   whole.posterior = Mix(components, weights, all);
   whole.findings.conflict =
       FindPriorConflict(problem, whole.posterior, whole.estimate.regularization);
-  DescribeWhole(problem.prior(), whole.posterior, whole.estimate);
+  DescribeWhole(problem.prior(), whole.posterior, whole.findings, whole.estimate);
   if (pieces.size() == 1) GoByDraws(whole.findings, whole.estimate);
   whole.filtered = MixFiltered(components);
   whole.estimate.filtered = DescribeFiltered(problem, whole.filtered, whole.posterior.weights);

@@ -1,0 +1,21 @@
+#pragma once
+
+// What an estimate says of one parameter, by the draws or by the prior.
+
+#include "core/bayes/prior.h"
+#include "core/estimator/posterior/diagnosis.h"
+#include "core/estimator/posterior/posterior_draws.h"
+#include "polyest/estimate.h"
+
+namespace polyest::internal {
+
+// Sets mean, posterior_std_dev and limits of parameter i.
+void DescribeMarginal(const PosteriorDraws& posterior, const Prior& prior, int i,
+                      ParameterEstimate& parameter);
+
+// Sets what is known of parameter i to what its prior says, where an expansion that is not accurate
+// would make it less, or its draws tell what its curvature does not, or the data are not used.
+void GoByPriorIfInaccurate(const Findings& findings, const Prior& prior, int i,
+                           ParameterEstimate& parameter);
+
+}  // namespace polyest::internal
