@@ -62,12 +62,13 @@ void DifferentialEvolution::Sweep(double beta, Eigen::Index first, Eigen::Index 
 }
 
 void DifferentialEvolution::MoveHalf(double beta, const Halves& halves, Particles& particles) {
-  const Eigen::Index choice =
-      straight_.empty() ? 0 : Draw(static_cast<Eigen::Index>(straight_.size()) + 1);
-  if (choice == 0) {
-    Propose(halves, particles.etas);
+  // Half of the moves are in η, the others in equal parts in each of the coordinates.
+  const auto kinds = static_cast<Eigen::Index>(straight_.size());
+  const Eigen::Index kind = kinds > 0 ? Draw(2 * kinds) : 0;
+  if (kind < kinds) {
+    ProposeIn(straight_[static_cast<size_t>(kind)], halves, particles.etas);
   } else {
-    ProposeIn(straight_[static_cast<size_t>(choice - 1)], halves, particles.etas);
+    Propose(halves, particles.etas);
   }
   Evaluate(proposal_, proposal_costs_);
   for (Eigen::Index i = 0; i < halves.count; ++i) {

@@ -5,6 +5,10 @@
 namespace polyest::internal {
 namespace {
 
+// The greatest scale of log θ for sums: one that is wider is too skewed in θ for differences there
+// to lead anywhere.
+constexpr double kMostSkewed = 1;
+
 // The quantiles of other correlated parameters would take longer than the cost itself.
 bool IsQuick(const Germ& own, const Germ& germ) {
   return own == germ || own.family() == GermFamily::kNormal || own.family() == GermFamily::kUniform;
@@ -19,6 +23,10 @@ StraightCoordinates::StraightCoordinates(const Prior& prior, const Region& regio
     const Germ germ(parameter.germ);
     const Germ& used = prior.germs()[static_cast<size_t>(i)];
     if ((parameter.map == map && used == germ) || !IsQuick(germ, used)) continue;
+    if (parameter.map == ParameterMap::kExponential && parameter.scale > kMostSkewed &&
+        map == ParameterMap::kAffine) {
+      continue;
+    }
     const bool positive = parameter.ToParameter(germ.Lower()) >= 0;
     const bool negative = parameter.ToParameter(germ.Upper()) <= 0;
     if (map == ParameterMap::kExponential && !positive && !negative) continue;

@@ -6,6 +6,9 @@
 #include <cmath>
 
 #include "core/chaos/germ.h"
+#include "core/estimator/problem/drifting_model.h"
+#include "core/estimator/problem/process_noise.h"
+#include "core/estimator/problem/settable_quantities.h"
 
 namespace polyest::internal {
 namespace {
@@ -14,10 +17,12 @@ bool IsOfLogarithm(const UncertainParameter& parameter) {
   return parameter.map == ParameterMap::kExponential;
 }
 
-// Whether it scales what the model computes, unlike the size of a noise or of a drift.
+// Whether it is a quantity of the model, unlike the size of a noise or of a drift.
 bool IsOfModel(const UncertainParameter& parameter) {
-  return parameter.part == PopulationPart::kNone && !absl::EndsWith(parameter.name, ".noise") &&
-         !absl::EndsWith(parameter.name, ".drift");
+  return parameter.part == PopulationPart::kNone &&
+         !absl::EndsWith(parameter.name, NoiseName("")) &&
+         !absl::EndsWith(parameter.name, DriftName("")) &&
+         !absl::StartsWith(parameter.name, SpectralDensityName(""));
 }
 
 bool MayChangeGerm(const UncertainParameter& parameter,

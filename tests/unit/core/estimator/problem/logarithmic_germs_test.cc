@@ -43,7 +43,9 @@ TEST(LogarithmicGerms, AreForUniformParametersBesideLogarithmicOnesOnly) {
   EXPECT_TRUE(HasChanged(k, {Lognormal("m")}));
   EXPECT_TRUE(HasChanged(k, {UncertainParameter::LogUniform("m", 1, 2).value()}));
   EXPECT_FALSE(HasChanged(k, {Uniform("m", 1, 2)}));
-  EXPECT_FALSE(HasChanged(k, {Lognormal("x.noise")}));
+  for (const char* name : {"x.noise", "c.drift", "processNoise.v"}) {
+    EXPECT_FALSE(HasChanged(k, {Lognormal(name)})) << name;
+  }
   EXPECT_FALSE(HasChanged(Uniform("k", 0, 60), {Lognormal("m")}));
   EXPECT_FALSE(HasChanged(Uniform("k", 1e-4, 60), {Lognormal("m")}));
   EXPECT_FALSE(HasChanged(k, {Lognormal("m")}, {{"m", "k", 0.5}}));
