@@ -27,8 +27,8 @@ StraightCoordinates::StraightCoordinates(const Prior& prior, const Region& regio
         map == ParameterMap::kAffine) {
       continue;
     }
-    const bool positive = parameter.ToParameter(germ.Lower()) >= 0;
-    const bool negative = parameter.ToParameter(germ.Upper()) <= 0;
+    const bool positive = parameter.ToParameter(germ.Lower()) > 0;
+    const bool negative = parameter.ToParameter(germ.Upper()) < 0;
     if (map == ParameterMap::kExponential && !positive && !negative) continue;
     curved_.push_back({i, negative ? -1.0 : 1.0});
   }

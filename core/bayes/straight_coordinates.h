@@ -5,7 +5,7 @@
 // one, the posterior is a thin curved ridge in germ coordinates.
 //
 //   of sums       u_i = θ_i, if the scale of a logarithmic prior is at most 1
-//   of products   u_i = log |θ_i|, if the prior of θ_i is of one sign
+//   of products   u_i = log |θ_i|, if the prior of θ_i has bounds of one sign
 //
 // and u_i = z_i where that would be affine in the score z_i, or does not exist, or would take long:
 // for beta, gamma and truncated normal priors that are correlated.

@@ -83,7 +83,7 @@ void DescribeWhole(const Prior& prior, const PosteriorDraws& posterior, const Fi
         VerdictOfContraction(contraction) != Verdict::kIdentified) {
       parameter.verdict = Verdict::kWeak;
     }
-    GoByPriorIfInaccurate(findings, prior, i, parameter);
+    if (!findings.UsesData()) GoByPriorIfInaccurate(findings, prior, i, parameter);
   }
 }
 

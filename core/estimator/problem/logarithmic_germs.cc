@@ -51,7 +51,7 @@ void ChangeGerm(UncertainParameter& parameter) {
 std::vector<UncertainParameter> ByLogarithms(std::vector<UncertainParameter> parameters,
                                              const std::vector<Correlation>& correlations) {
   const bool mixed = std::ranges::any_of(parameters, [](const UncertainParameter& parameter) {
-    return IsOfLogarithm(parameter) && IsOfModel(parameter);
+    return IsOfLogarithm(parameter) && IsOfModel(parameter) && !parameter.drift;
   });
   if (!mixed) return parameters;
   for (UncertainParameter& parameter : parameters) {

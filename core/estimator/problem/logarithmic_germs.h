@@ -12,8 +12,8 @@
 namespace polyest::internal {
 
 // Returns the parameters with the same distributions, and germs of logarithms for the uniform ones
-// if others have such. Those that are correlated, of a population or a random walk, and those whose
-// upper bound is more than e^10 times the lower one, keep their germs.
+// if others of the model that do not drift have such. Those that are correlated, of a population or
+// drift, and those whose upper bound is more than e^10 times the lower one, keep their germs.
 std::vector<UncertainParameter> ByLogarithms(std::vector<UncertainParameter> parameters,
                                              const std::vector<Correlation>& correlations);
 

@@ -17,7 +17,7 @@ UncertainParameter Uniform(const char* name, double lower, double upper) {
 // Of all kinds: positive and negative priors, one that holds 0, and one whose logarithm is affine.
 Prior Independent() {
   return Prior({Uniform("a", 1, 9), Uniform("b", -5, -2), Uniform("c", -1, 2),
-                UncertainParameter::Gamma("d", 2, 3, 0).value(),
+                UncertainParameter::Gamma("d", 2, 3, 1).value(),
                 UncertainParameter::Lognormal("e", 2, 1).value()});
 }
 
@@ -92,7 +92,7 @@ TEST(StraightCoordinates, OfProductsAreLogarithmsWhereThePriorHasOneSign) {
   EXPECT_NEAR(u[0], std::log(7.0), 1e-15);
   EXPECT_NEAR(u[1], std::log(2.75), 1e-15);
   EXPECT_EQ(u[2], 0.5);  // may be 0
-  EXPECT_NEAR(u[3], std::log(1.5), 1e-15);
+  EXPECT_NEAR(u[3], std::log(2.5), 1e-15);
   EXPECT_EQ(u[4], 0.5);  // its logarithm is affine
 }
 
