@@ -37,8 +37,8 @@ class Cost {
   // CostValue::mismatch.
   double power() const { return power_; }
   void set_power(double power) { power_ = power; }
-  // Returns the cost of the noise and the prior as they were stated: its power is 1, and its modes
-  // are those of uniform parameters whatever their germs.
+  // Returns the cost that an estimate minimizes, of the noise and the prior as they were stated: β
+  // is 1, and J_apriori is constant in uniform parameters (Prior::WithModesOfUniform).
   Cost AsStated() const;
 
   // The number of threads, ≥ 1, on which EvaluateMany computes; its results do not depend on it.

@@ -31,10 +31,10 @@ class Prior {
 
   int dimension() const { return static_cast<int>(parameters_.size()); }
   const std::vector<UncertainParameter>& parameters() const { return parameters_; }
-  // Returns the prior with the exponential germs replaced by uniform ones. Where no data tell of a
-  // parameter, its J_apriori is constant, as that of a uniform θ: its mode is the mode of θ.
+  // Returns the prior with uniform germs in place of the exponential ones, for the search of modes:
+  // J_apriori is then constant in such a parameter, as the density of a uniform θ is.
   Prior WithModesOfUniform() const;
-  bool has_exponential_germs() const;
+  bool has_exponential_germs() const;  // whether that makes a difference
 
   std::vector<std::string> Names() const;  // of the parameters, in order
   // The germs of ξ_i and z_i: normal for a correlated parameter, whatever the germ of its marginal.

@@ -5,11 +5,12 @@
 namespace polyest::internal {
 namespace {
 
-// The greatest scale of log θ for sums: one that is wider is too skewed in θ for differences there
-// to lead anywhere.
+// The greatest scale of log θ for sums. The θ of a wider prior is so skewed that the difference of
+// two draws hardly ever leads from a third to a probable value.
 constexpr double kMostSkewed = 1;
 
-// The quantiles of other correlated parameters would take longer than the cost itself.
+// Whether a score is quickly mapped to the parameter. The quantiles of other correlated parameters
+// would take longer than the cost itself.
 bool IsQuick(const Germ& own, const Germ& germ) {
   return own == germ || own.family() == GermFamily::kNormal || own.family() == GermFamily::kUniform;
 }

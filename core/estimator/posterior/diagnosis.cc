@@ -230,11 +230,10 @@ void AddMinima(const Findings& findings, std::vector<Diagnostic>& diagnostics) {
   if (!findings.not_mixed.empty()) {
     diagnostics.push_back(
         {DiagnosticCode::kNotConverged,
-         absl::StrFormat(
-             "the Markov chains have not mixed, and what they say of the posterior may "
-             "be wrong: %s; narrower priors of those parameters that the data tell only "
-             "together would help",
-             findings.not_mixed)});
+         absl::StrFormat("the Markov chains have not mixed, and what they say of the posterior may "
+                         "be wrong: %s; narrower priors of parameters that the data tell only in "
+                         "combination would help",
+                         findings.not_mixed)});
   }
 }
 
@@ -250,9 +249,9 @@ void AddInaccuracy(const Findings& findings, const Estimate& estimate,
   if (!findings.UsesData()) {
     diagnostics.push_back(
         {DiagnosticCode::kExpansionInaccurate,
-         absl::StrFormat("no expansion of order %d has followed the model to where the data ask "
-                         "for: the data tell nothing that could be relied upon, and what is "
-                         "reported is the prior; %s",
+         absl::StrFormat("no expansion of order %d follows the model where the data put the "
+                         "parameters, so that the data could not be used; what is reported is "
+                         "the prior; %s",
                          estimate.expansion.order, remedy)});
   } else if (findings.power < 1) {
     diagnostics.push_back(

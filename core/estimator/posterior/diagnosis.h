@@ -20,7 +20,8 @@ namespace polyest::internal {
 inline constexpr double kInaccurateShift = 0.25;
 // Ratio of the draws' and the curvature's standard deviations from which on they contradict.
 inline constexpr double kContradiction = 2;
-// Power of the likelihood below which the posterior is nothing but where the expansion was made.
+// Power of the likelihood below which the posterior shows where the expansion was made and not what
+// the data say.
 inline constexpr double kLeastUsed = 0.01;
 
 struct Findings {

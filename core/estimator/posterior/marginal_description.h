@@ -13,8 +13,8 @@ namespace polyest::internal {
 void DescribeMarginal(const PosteriorDraws& posterior, const Prior& prior, int i,
                       ParameterEstimate& parameter);
 
-// Sets what is known of parameter i to what its prior says, where an expansion that is not accurate
-// would make it less, or its draws tell what its curvature does not, or the data are not used.
+// Sets what is known of parameter i to what its prior says: if the data are not used, and if the
+// expansion is not accurate and would tell less than the prior, or the curvature tells nothing.
 void GoByPriorIfInaccurate(const Findings& findings, const Prior& prior, int i,
                            ParameterEstimate& parameter);
 

@@ -37,9 +37,9 @@ double HighestBetween(const Cost& cost, const Vector& from, const Vector& to) {
   return highest;
 }
 
-// Whether the cost stays below `most` on a way between two minima that follows a valley which may
-// be curved: from one slice across the straight way to the next, each point is the least of its
-// slice that a search reaches from the point before.
+// Whether a valley, straight or curved, leads from one point to the other in which the cost does
+// not rise above `most`. Its points are minima of slices across the straight way, each searched
+// from the one before.
 bool IsValleyBetween(const Cost& cost, const MinimizationProblem& search, const Vector& from,
                      const Vector& to, double most, const Stop& stop) {
   const Vector way = to - from;

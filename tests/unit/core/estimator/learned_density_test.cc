@@ -73,15 +73,18 @@ TEST(LearnedDensity, IsAveragedOverWhereThereIsNoProcessNoise) {
   const Estimate estimate = EstimateOf(problem, samples);
   problem.expansion.order = 5;
   const Estimate fine = EstimateOf(problem, samples);
-  // Where the default order is called inaccurate, its uncertainty is the wider.
-  const double shift = Has(estimate, DiagnosticCode::kExpansionInaccurate) ? 1 : 0.08;
+  // Whether an expansion of the default order holds depends on where the draws have led it. Where
+  // it is called inaccurate, its uncertainty is the wider.
+  const bool inaccurate = Has(estimate, DiagnosticCode::kExpansionInaccurate);
   for (Eigen::Index i = 0; i < 2; ++i) {
     const ParameterEstimate& parameter = fine.parameters[static_cast<size_t>(i)];
     EXPECT_NEAR(parameter.mean, mean[i], 0.05 * std_dev[i]) << parameter.name;
     EXPECT_NEAR(parameter.posterior_std_dev, std_dev[i], 0.05 * std_dev[i]);
     const ParameterEstimate& at_default = estimate.parameters[static_cast<size_t>(i)];
-    EXPECT_NEAR(at_default.mean, mean[i], shift * std_dev[i]) << parameter.name;
-    EXPECT_GT(at_default.posterior_std_dev, 0.95 * std_dev[i]);
+    const double deviation = at_default.posterior_std_dev;
+    EXPECT_NEAR(at_default.mean, mean[i], (inaccurate ? 0.5 : 0.08) * std_dev[i]) << parameter.name;
+    EXPECT_GT(deviation, 0.95 * std_dev[i]);
+    EXPECT_LT(deviation, (inaccurate ? 1.25 : 1.05) * std_dev[i]);
   }
   // The cost hardly depends on densities below the limit, so that its curvature says nothing.
   const ParameterEstimate& density = fine.parameters[2];
