@@ -1,0 +1,75 @@
+#include "core/estimator/posterior/marginal_description.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "core/estimator/problem/logarithmic_germs.h"
+
+namespace polyest::internal::marginal_description_test {
+namespace {
+
+// A lognormal parameter and a uniform one, whose germ is that of its logarithm.
+Prior Mixed() {
+  return Prior(ByLogarithms({UncertainParameter::Lognormal("m", 1, 0.4).value(),
+                             UncertainParameter::Uniform("k", 20, 60).value()},
+                            {}));
+}
+
+ParameterEstimate Narrow(const Prior& prior, int i) {
+  ParameterEstimate parameter;
+  parameter.prior_mean = prior.Mean()[i];
+  parameter.prior_std_dev = prior.StandardDeviation()[i];
+  parameter.map = parameter.mean = 25;
+  parameter.std_dev = parameter.posterior_std_dev = 0.1;
+  parameter.verdict = Verdict::kWeak;
+  return parameter;
+}
+
+Findings WithPower(double power) {
+  Findings findings;
+  findings.power = power;
+  return findings;
+}
+
+TEST(MarginalDescription, IsThePriorWhereTheDataAreNotUsed) {
+  const Prior prior = Mixed();
+  ParameterEstimate k = Narrow(prior, 1);
+  GoByPriorIfInaccurate(WithPower(0.009), prior, 1, k);
+  EXPECT_EQ(k.verdict, Verdict::kNotIdentified);
+  EXPECT_EQ(k.mean, k.prior_mean);
+  EXPECT_EQ(k.std_dev, k.prior_std_dev);
+  EXPECT_EQ(k.posterior_std_dev, k.prior_std_dev);
+  EXPECT_NEAR(k.lower95, 21, 1e-9);
+  EXPECT_NEAR(k.upper95, 59, 1e-9);
+  ParameterEstimate m = Narrow(prior, 0);
+  GoByPriorIfInaccurate(WithPower(0.009), prior, 0, m);
+  EXPECT_NEAR(m.map, std::exp(prior.parameters()[0].location), 1e-12);
+}
+
+TEST(MarginalDescription, IsThatOfTheDrawsWhereTheDataAreUsed) {
+  const Prior prior = Mixed();
+  ParameterEstimate k = Narrow(prior, 1);
+  GoByPriorIfInaccurate(WithPower(0.011), prior, 1, k);
+  EXPECT_EQ(k.verdict, Verdict::kWeak);
+  EXPECT_EQ(k.mean, 25);
+  k.verdict = Verdict::kNotIdentified;
+  GoByPriorIfInaccurate(WithPower(1), prior, 1, k);
+  EXPECT_EQ(k.mean, 25);
+  GoByPriorIfInaccurate(WithPower(0.5), prior, 1, k);
+  EXPECT_EQ(k.mean, k.prior_mean);
+  EXPECT_EQ(k.map, 25);
+}
+
+// Chains that have not mixed may be as wrong as an expansion that the model contradicts.
+TEST(Findings, DoubtEveryParameterWhereChainsHaveNotMixed) {
+  Findings findings;
+  findings.windows.doubtful = {false, false};
+  EXPECT_FALSE(findings.IsDoubtful(0));
+  findings.not_mixed = "R̂ is 1.200";
+  EXPECT_TRUE(findings.IsDoubtful(0));
+  EXPECT_TRUE(findings.IsDoubtful(1));
+}
+
+}  // namespace
+}  // namespace polyest::internal::marginal_description_test
