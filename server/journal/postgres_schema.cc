@@ -62,8 +62,10 @@ constexpr const char* kPostgresMigrations[] = {
          node bigint,
          epoch bigint NOT NULL) WITH (fillfactor = 50);
        CREATE INDEX owner_by_node ON owner (node);)",
-    "ALTER TABLE node ADD streams bigint NOT NULL DEFAULT 0, ADD busy_cores double precision NOT "
-    "NULL DEFAULT 0, ADD draining boolean NOT NULL DEFAULT false;",
+    R"(ALTER TABLE node
+         ADD streams bigint NOT NULL DEFAULT 0,
+         ADD busy_cores double precision NOT NULL DEFAULT 0,
+         ADD draining boolean NOT NULL DEFAULT false;)",
     // The parts of large batches but their last ones, and how many a batch has (batch_parts.h).
     R"(CREATE TABLE part (
          session bigint NOT NULL,

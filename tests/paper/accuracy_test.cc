@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <random>
 
 #include "polyest/catalogue.h"
 #include "tests/testing/oscillator.h"
@@ -130,12 +131,31 @@ TEST_P(AirTrackRecord, AgreesWithLeastSquaresOnTheExactModel) {
     ExpectNear(estimate.parameters[i], exact[i], 0.05, 0.1, 0.02,
                Has(estimate, DiagnosticCode::kCorrelatedResiduals));
   }
-  EXPECT_LT(estimate.expansion.trajectories, order == 2 ? 111 : 385);
+  EXPECT_LT(estimate.expansion.trajectories, order == 2 ? 153 : 385);
   RecordProperty("trajectories", static_cast<int>(estimate.expansion.trajectories));
   EXPECT_LT(estimate.expansion.residual_to_noise, 0.1);
 }
 
 INSTANTIATE_TEST_SUITE_P(OrdersTwoAndThree, AirTrackRecord, ::testing::Values(2, 3));
+
+// How many trajectories one record takes is a matter of chance: draws decide where an expansion is
+// checked, and one region more or less makes 24 trajectories. Copies that differ by a twentieth of
+// the noise take 80 on average, with a standard deviation of 24, so that the mean of twelve is
+// below the least number that the sketch of the method took.
+TEST(AirTrackCopies, NeedFewerTrajectoriesThanTheSketchOfTheMethod) {
+  const auto record = SharedRecord("air_track_1mass.csv", {"x"});
+  if (!record) GTEST_SKIP() << "../shared/data/air_track_1mass.csv is not there";
+  constexpr int kCopies = 12;
+  double sum = 0;
+  for (uint64_t seed = 0; seed < kCopies; ++seed) {
+    std::mt19937_64 generator(seed);
+    std::normal_distribution<double> noise(0, 0.02);
+    Samples copy = *record;
+    for (double& x : copy.columns[0].value) x += noise(generator);
+    sum += static_cast<double>(EstimateInBatches(AirTrack(2), copy, 30).expansion.trajectories);
+  }
+  EXPECT_LT(sum / kCopies, 111);
+}
 
 // The record has twelve unknowns and starts cold; a fit of the whole record at once ends in wrong
 // minima. The oracle is least squares on the exact model from the right minimum.

@@ -62,20 +62,16 @@ inline std::string Utf16(const std::string& ascii, bool big_endian, bool mark) {
   return bytes;
 }
 
-inline const Change kDecimalComma = [](DataColumns& c) { c.options.decimal = ','; };
-inline const Change kDecimalPoint = [](DataColumns& c) { c.options.decimal = '.'; };
-inline const Change kTimeFirst = [](DataColumns& c) {
-  c.options.time_zero = DataFileOptions::TimeZero::kFirst;
-};
-inline const Change kTimeFile = [](DataColumns& c) {
-  c.options.time_zero = DataFileOptions::TimeZero::kFile;
-};
-inline const Change kDayFirst = [](DataColumns& c) {
+inline void DecimalComma(DataColumns& c) { c.options.decimal = ','; }
+inline void DecimalPoint(DataColumns& c) { c.options.decimal = '.'; }
+inline void TimeFirst(DataColumns& c) { c.options.time_zero = DataFileOptions::TimeZero::kFirst; }
+inline void TimeFile(DataColumns& c) { c.options.time_zero = DataFileOptions::TimeZero::kFile; }
+inline void DayFirst(DataColumns& c) {
   c.options.date_order = DataFileOptions::DateOrder::kDayFirst;
-};
-inline const Change kMonthFirst = [](DataColumns& c) {
+}
+inline void MonthFirst(DataColumns& c) {
   c.options.date_order = DataFileOptions::DateOrder::kMonthFirst;
-};
+}
 
 inline Change From(const std::string& quantity, const std::string& from,
                    const std::string& unit = "") {
