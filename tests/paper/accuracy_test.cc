@@ -140,12 +140,12 @@ INSTANTIATE_TEST_SUITE_P(OrdersTwoAndThree, AirTrackRecord, ::testing::Values(2,
 
 // How many trajectories one record takes is a matter of chance: draws decide where an expansion is
 // checked, and one region more or less makes 24 trajectories. Copies that differ by a twentieth of
-// the noise take 80 on average, with a standard deviation of 24, so that the mean of twelve is
-// below the least number that the sketch of the method took.
+// the noise take 84 on average, with a standard deviation of 25, so that the mean of ten is below
+// the least number that the sketch of the method took.
 TEST(AirTrackCopies, NeedFewerTrajectoriesThanTheSketchOfTheMethod) {
   const auto record = SharedRecord("air_track_1mass.csv", {"x"});
   if (!record) GTEST_SKIP() << "../shared/data/air_track_1mass.csv is not there";
-  constexpr int kCopies = 12;
+  constexpr int kCopies = 10;
   double sum = 0;
   for (uint64_t seed = 0; seed < kCopies; ++seed) {
     std::mt19937_64 generator(seed);

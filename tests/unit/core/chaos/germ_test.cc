@@ -59,9 +59,8 @@ double Integral(const Germ& germ, const std::function<double(double)>& f) {
   return sum;
 }
 
-// Returns P_0 … P_order of the germ at ξ by the recurrence.
-Vector Polynomials(const Germ& germ, int order, double xi) {
-  const RecurrenceCoefficients recurrence = germ.Recurrence(order + 1);
+// Returns P_0 … P_order at ξ by the recurrence, of which more than `order` coefficients are given.
+Vector Polynomials(const RecurrenceCoefficients& recurrence, int order, double xi) {
   Vector values(order + 1);
   values[0] = 1;
   for (int k = 0; k < order; ++k) {
@@ -70,6 +69,10 @@ Vector Polynomials(const Germ& germ, int order, double xi) {
     values[k + 1] = next / std::sqrt(recurrence.b[k + 1]);
   }
   return values;
+}
+
+Vector Polynomials(const Germ& germ, int order, double xi) {
+  return Polynomials(germ.Recurrence(order + 1), order, xi);
 }
 
 TEST(Germ, DensityHasUnitAreaAndTheStatedMoments) {
@@ -86,10 +89,11 @@ TEST(Germ, DensityHasUnitAreaAndTheStatedMoments) {
 TEST(Germ, PolynomialsAreOrthonormalUnderTheDensityUpToOrderTen) {
   for (const Germ& germ : AllGerms()) {
     SCOPED_TRACE(Name(germ));
+    const RecurrenceCoefficients recurrence = germ.Recurrence(11);
     for (int i = 0; i <= 10; ++i) {
       for (int j = 0; j <= i; ++j) {
         const double product = Integral(germ, [&](double xi) {
-          const Vector values = Polynomials(germ, i, xi);
+          const Vector values = Polynomials(recurrence, i, xi);
           return values[i] * values[j];
         });
         // The rounding error grows with the cancellation between the lobes of the integrand.
