@@ -68,6 +68,7 @@ class Reader {
   std::map<std::string, std::string> declared_;  // what each name is: "a state"
   std::map<std::string, int> table_arguments_;
   std::set<std::string> free_;  // undeclared names that become parameters
+  bool all_read_ = true;        // false: an expression that cannot be read may have more of them
 };
 
 // Refuses more than `most` items with ResourceExhausted. In the message `what` follows the number
@@ -177,6 +178,7 @@ void Reader::ReadAll(const char* member, const std::map<std::string, std::string
     absl::StatusOr<Syntax> syntax = Parse(Path(member, name), text, table_arguments_);
     if (!syntax.ok()) {
       problems_.push_back(std::move(syntax).status());
+      all_read_ = false;
       continue;
     }
     ReadNames(*syntax);
@@ -240,7 +242,8 @@ void Reader::ReadParameters() {
 void Reader::CheckUnitNames() {
   for (const auto& [name, unit] : specification_.units) {
     const auto found = declared_.find(name);
-    const bool known = found == declared_.end() ? free_.contains(name) : found->second != "a table";
+    const bool known =
+        found == declared_.end() ? !all_read_ || free_.contains(name) : found->second != "a table";
     if (known) continue;
     Wrong(Path("units"), absl::StrFormat("%s is not a name in these equations", Quoted(name)));
   }

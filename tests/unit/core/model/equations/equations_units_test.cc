@@ -132,6 +132,12 @@ TEST(EquationUnits, AreOfNamesThatThereAre) {
                   "model.equations.units.k: the unit \"Nm\" has the unknown symbol \"Nm\"")));
 }
 
+// The expression that cannot be read may have the name.
+TEST(EquationUnits, AreNotRefusedBesideAnExpressionThatCannotBeRead) {
+  EXPECT_THAT(Messages({.outputs = {{"y", "k +"}, {"z", "1"}}, .units = {{"k", "N/m"}}}),
+              ElementsAre(HasSubstr("model.equations.outputs.y: column 4: expected a number")));
+}
+
 TEST(EquationUnits, OfOutputsFollowFromTheirExpressions) {
   const auto unit = [](const std::string& text) {
     const auto model = MakeOrFail(Output(text, ""));
