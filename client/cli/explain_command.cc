@@ -201,16 +201,16 @@ absl::Status Explain(const ExplainArguments& arguments, std::ostream& out) {
     if (!answer.ok()) return InInput(answer.status(), arguments);
     design = *std::move(answer);
   }
-  std::optional<absl::StatusOr<RemedyTrial>> trial;
-  if (!arguments.no_remedies && CallsForRemedies(input.estimate)) {
-    trial = TryOnRecord(input, *backend);
-  }
   backend.reset();  // erases its progress line
   PrintExplanation(input.estimate, open, design, out);
-  if (!trial) return absl::OkStatus();
-  if (!trial->ok()) return InInput(trial->status(), arguments);
-  PrintTrial(**trial, out);
-  return InInput((*trial)->ended, arguments);
+  if (arguments.no_remedies || !CallsForRemedies(input.estimate)) return absl::OkStatus();
+  out.flush();  // since remedies may take minutes
+  backend = MakeBackend(arguments.place);
+  const absl::StatusOr<RemedyTrial> trial = TryOnRecord(input, *backend);
+  backend.reset();
+  if (!trial.ok()) return InInput(trial.status(), arguments);
+  PrintTrial(*trial, out);
+  return InInput(trial->ended, arguments);
 }
 
 }  // namespace
