@@ -3,7 +3,8 @@
 // Bisection of an element whose expansion does not follow the model (multi-element polynomial
 // chaos). The element is cut across the axis of its region along which the expansion's terms of the
 // highest degrees weigh most: there the polynomials have run out first, and half the width reduces
-// their error by 2^(p+1).
+// their error by 2^(p+1). Where they have run out so far that the terms say nothing of the model,
+// the cut is across the axis on which χ² at the collocation points depends most.
 
 #include <vector>
 
