@@ -176,6 +176,15 @@ absl::Status ComponentMixture::Unite(const std::vector<Matrix>& particles, const
   return absl::OkStatus();
 }
 
+// Returns the elements of all components but one.
+std::vector<const Element*> ComponentMixture::ElementsBeside(size_t component) const {
+  std::vector<const Element*> elements;
+  for (size_t k = 0; k < components_.size(); ++k) {
+    if (k != component) elements.push_back(&components_[k]->element());
+  }
+  return elements;
+}
+
 // Frees elements from bounds on which their posterior presses and beyond which all others have been
 // dropped: while the expansions were not accurate yet, the other side looked too light. `particles`
 // are those of each component. What cannot be integrated stays beyond its bound.
@@ -183,11 +192,7 @@ void ComponentMixture::FreeBounds(const std::vector<Matrix>& particles) {
   if (elements_left_out_ > 0 || particles.size() != components_.size()) return;
   std::vector<Element> freed;
   for (size_t k = 0; k < components_.size(); ++k) {
-    std::vector<const Element*> others;
-    for (const auto& other : components_) {
-      if (other != components_[k]) others.push_back(&other->element());
-    }
-    freed.push_back(components_[k]->element().Freed(others, particles[k]));
+    freed.push_back(components_[k]->element().Freed(ElementsBeside(k), particles[k]));
   }
   for (size_t k = 0; k < freed.size(); ++k) components_[k]->set_element(std::move(freed[k]));
 }
@@ -221,7 +226,10 @@ std::vector<AssessmentRequest> ComponentMixture::Requests(const Components& comp
 absl::StatusOr<AssessedMixture> ComponentMixture::Assess(const PosteriorEffort& effort,
                                                          const Stop& stop) const {
   std::vector<AssessmentRequest> requests = Requests(components_);
-  for (AssessmentRequest& request : requests) request.effort = effort;
+  for (size_t k = 0; k < requests.size(); ++k) {
+    requests[k].effort = effort;
+    if (elements_left_out_ == 0) requests[k].others = ElementsBeside(k);
+  }
   requests.front().reexpansions += reexpansions_;
   requests.front().propagated_rows += propagated_rows_;
   POLYEST_ASSIGN_OR_RETURN(AssessedMixture assessed,

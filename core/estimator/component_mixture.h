@@ -63,6 +63,7 @@ class ComponentMixture {
   absl::StatusOr<std::vector<Matrix>> KeepHeaviest(Components& components, double weight,
                                                    size_t most, const Stop& stop);
   absl::Status Unite(const std::vector<Matrix>& particles, const Stop& stop);
+  std::vector<const Element*> ElementsBeside(size_t component) const;
   void FreeBounds(const std::vector<Matrix>& particles);
   void LeaveOut(size_t component);
   void Retire(const MixtureComponent& component);

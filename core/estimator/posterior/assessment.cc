@@ -136,8 +136,16 @@ class Assessment {
     const Matrix xis =
         posterior_.Germs(prior_)(EquallyWeighted(posterior_.weights, kDrawsForEdges), Eigen::all);
     findings_.leans =
-        findings_.leans ||
+        findings_.leans || PressesOnDropped(xis) ||
         !LeaningAxes(design_, prior_, design_.region.ManyToLocal(xis), kOverEdge).empty();
+  }
+
+  // Whether the posterior presses on a bound of its element beyond which all has been dropped: that
+  // was too early.
+  bool PressesOnDropped(const Matrix& xis) const {
+    if (!request_.others) return false;
+    const Element& element = design_.element;
+    return element.Freed(*request_.others, xis).bounds().size() < element.bounds().size();
   }
 
   void Summarize(const Cost& cost, const Vector& eta) {

@@ -7,7 +7,9 @@
 #include <absl/status/statusor.h>
 
 #include <optional>
+#include <vector>
 
+#include "core/bayes/element.h"
 #include "core/estimator/expansion/regional_expansion.h"
 #include "core/estimator/expansion/replay_allowance.h"
 #include "core/estimator/posterior/diagnosis.h"
@@ -34,6 +36,9 @@ struct AssessmentRequest {
   bool weigh = false;
   std::optional<double> power;  // of the likelihood, if it is common to several
   double last_weight = 1;
+  // The elements of the other components, if beyond the bounds of its own there is either one of
+  // them or a part of the prior that was dropped for its weight; not set if it is not looked there.
+  std::optional<std::vector<const Element*>> others;
   Postponed postponed;  // what the limit on rows that are propagated again has put off
 };
 
