@@ -67,10 +67,12 @@ absl::Status ComponentMixture::TakeUpTo(int64_t rows, const Stop& stop) {
 }
 
 // Whether the components are weighed at a row up to the first `rows`. A single one is, too, as long
-// as its element has bounds, on which its posterior may begin to press at any window.
+// as its element has bounds of which it may be freed, since at any window its posterior may begin
+// to press on them.
 bool ComponentMixture::WeighsUpTo(int64_t rows) const {
   const bool is_bounded = !components_.front()->element().bounds().empty();
-  return weighing_row_ <= rows && (components_.size() > 1 || is_bounded);
+  return weighing_row_ <= rows &&
+         (components_.size() > 1 || (is_bounded && elements_left_out_ == 0));
 }
 
 int64_t ComponentMixture::rows_taken() const {
