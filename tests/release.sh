@@ -72,7 +72,7 @@ soak() {
   python3 -B tests/soak/soak.py build/release/bin/polyestd --minutes "$soak_minutes"
 }
 
-sanitized() { tests/run.sh --preset asan-ubsan --target polyest_unit_tests --label long; }
+sanitized() { tests/run.sh --preset asan-ubsan --target polyest_long_tests --label long; }
 
 fuzz() { tests/fuzz/run.sh 1800; }
 

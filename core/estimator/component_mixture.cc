@@ -24,7 +24,9 @@ absl::StatusOr<std::unique_ptr<ComponentMixture>> ComponentMixture::OfPrior(
 absl::StatusOr<std::unique_ptr<ComponentMixture>> ComponentMixture::FromState(
     const ResolvedProblem& problem, MixtureState state, int64_t rows, const SampleStore* store,
     int threads, const Stop& stop) {
-  if (state.components.empty() || std::ssize(state.components) > MostComponents(problem)) {
+  const bool several = state.components.size() > 1;
+  if (state.components.empty() || std::ssize(state.components) > MostComponents(problem) ||
+      (several && state.weighing_row <= rows)) {
     return absl::DataLossError("the snapshot's components cannot be of a mixture");
   }
   std::unique_ptr<ComponentMixture> mixture(new ComponentMixture);
@@ -39,9 +41,6 @@ absl::StatusOr<std::unique_ptr<ComponentMixture>> ComponentMixture::FromState(
   mixture->elements_left_out_ = state.elements_left_out;
   mixture->reexpansions_ = state.reexpansions;
   mixture->propagated_rows_ = state.propagated_rows;
-  if (mixture->WeighsUpTo(rows)) {
-    return absl::DataLossError("the snapshot's components should have been weighed");
-  }
   return mixture;
 }
 
@@ -58,21 +57,12 @@ MixtureState ComponentMixture::State() const {
 
 absl::Status ComponentMixture::TakeUpTo(int64_t rows, const Stop& stop) {
   while (true) {
-    const bool weighs = WeighsUpTo(rows);
+    const bool weighs = components_.size() > 1 && weighing_row_ <= rows;
     POLYEST_ASSIGN_OR_RETURN(const bool divided, TakeOrDivide(weighs ? weighing_row_ : rows, stop));
     if (divided) continue;
     if (!weighs) return absl::OkStatus();
     POLYEST_RETURN_IF_ERROR(Weigh(stop));
   }
-}
-
-// Whether the components are weighed at a row up to the first `rows`. A single one is, too, as long
-// as its element has bounds of which it may be freed, since at any window its posterior may begin
-// to press on them.
-bool ComponentMixture::WeighsUpTo(int64_t rows) const {
-  const bool is_bounded = !components_.front()->element().bounds().empty();
-  return weighing_row_ <= rows &&
-         (components_.size() > 1 || (is_bounded && elements_left_out_ == 0));
 }
 
 int64_t ComponentMixture::rows_taken() const {

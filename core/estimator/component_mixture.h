@@ -56,7 +56,6 @@ class ComponentMixture {
 
   ComponentMixture() = default;
 
-  bool WeighsUpTo(int64_t rows) const;
   absl::StatusOr<bool> TakeOrDivide(int64_t rows, const Stop& stop);
   absl::Status Divide(size_t component, const Stop& stop);
   absl::Status Weigh(const Stop& stop);
@@ -70,7 +69,7 @@ class ComponentMixture {
   static std::vector<AssessmentRequest> Requests(const Components& components);
 
   Components components_;
-  int64_t weighing_row_ = 0;   // row of the next weighing, if there is one (WeighsUpTo)
+  int64_t weighing_row_ = 0;   // row of the next weighing, if there are several components
   double left_out_ = 0;        // largest share of components dropped for lack of room
   int elements_left_out_ = 0;  // because too few of their trajectories could be integrated
   int reexpansions_ = 0;       // by components that no longer exist

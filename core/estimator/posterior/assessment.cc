@@ -70,8 +70,9 @@ class Assessment {
         std::hypot(findings_.shift, findings_.integration_shift, findings_.population_shift);
     fitted_ = FittedParameters(design_.region.HessianToGerm(cost.MismatchHessian(eta)), prior_);
     spent_ = fitted_ + 2;
-    WidenForShift();
+    // By the draws before they are widened: farther from the minimum no noise explains the record.
     estimate_.channels = DescribeChannels(request_, cost, eta, posterior_, fitted_);
+    WidenForShift();
     findings_.degrees = DegreesOfFreedom(request_, estimate_.channels, fitted_);
     DescribeWindows(cost, eta);
     DescribeParameters(cost, eta);

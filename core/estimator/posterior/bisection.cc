@@ -13,7 +13,7 @@ namespace {
 // The variance of the outputs that the expansion leaves unexplained, as a part of what its terms
 // explain, up to which the terms are those of the model.
 constexpr double kUnexplained = 0.1;
-// So many collocation points for each coefficient of a quadratic leave residuals to look at.
+// The collocation points for each coefficient of a quadratic from which on it leaves residuals.
 constexpr Eigen::Index kPointsPerCoefficient = 2;
 
 // Returns the axis on which the terms of the two highest degrees depend most: each counts by its
@@ -41,11 +41,14 @@ Eigen::Index CoefficientsOfQuadratic(Eigen::Index dimension) {
 // order, least squares spreads them over all terms, and their weights are those of chance.
 bool HasTermsOfTheModel(const RegionalExpansion& expansion) {
   const Vector weights = expansion.TermWeights();
-  const double explained = weights.tail(weights.size() - 1).sum();
+  return expansion.OwnError() <= kUnexplained * weights.tail(weights.size() - 1).sum();
+}
+
+// Whether a quadratic in the collocation points leaves residuals to look at.
+bool HasResidualsOfQuadratic(const RegionalExpansion& expansion) {
   const auto points = std::ssize(expansion.kept_points());
-  const Eigen::Index n = expansion.design().points.cols();
-  return expansion.OwnError() <= kUnexplained * explained ||
-         points < kPointsPerCoefficient * CoefficientsOfQuadratic(n);
+  return points >=
+         kPointsPerCoefficient * CoefficientsOfQuadratic(expansion.design().points.cols());
 }
 
 // Returns what the quadratic in the points (Q × n) that fits the values best leaves of them.
@@ -111,7 +114,8 @@ Eigen::Index AxisOfFailures(const RegionalExpansion& expansion) {
 
 Eigen::Index AxisToCut(const RegionalExpansion& expansion) {
   if (expansion.absorbed_rows() == 0) return AxisOfFailures(expansion);
-  return HasTermsOfTheModel(expansion) ? AxisOfTerms(expansion) : AxisOfModel(expansion);
+  const bool by_terms = HasTermsOfTheModel(expansion) || !HasResidualsOfQuadratic(expansion);
+  return by_terms ? AxisOfTerms(expansion) : AxisOfModel(expansion);
 }
 
 // Returns the half of the region on one side, −1 or 1, of the middle of its axis.

@@ -229,6 +229,8 @@ absl::StatusOr<bool> MixtureComponent::SettleAfterWindow(const Stop& stop) {
   }
   row_end_ = {};  // where nothing was settled
   window_end_ = NextWindow(taken_, windows_from_);
+  const int64_t to_learn = MinSamplesForNoise(problem_.dimension());
+  if (learns_noise_ && taken_ < to_learn) window_end_ = std::min(window_end_, to_learn);
   edges_row_ = NextLook();
   return moved;
 }

@@ -6,6 +6,7 @@
 
 #include "core/bayes/identifiability.h"
 #include "core/common/status.h"
+#include "core/estimator/posterior/component_of_estimate.h"
 #include "core/estimator/posterior/connected_elements.h"
 #include "core/estimator/posterior/marginal_description.h"
 #include "core/estimator/posterior/mixture_weighing.h"
@@ -88,18 +89,17 @@ void DescribeWhole(const Prior& prior, const PosteriorDraws& posterior, const Fi
 }
 
 // The curvature at the minimum is that of one component. Where it contradicts the draws of several
-// that are one piece of the posterior, the draws count, if nothing speaks against them.
+// that are one piece of the posterior, the draws count if they are the wider ones, or if nothing
+// speaks against them.
 void GoByDraws(Findings& findings, Estimate& estimate) {
-  if (findings.power < 1 || findings.shift > kInaccurateShift || findings.windows.contradicted ||
-      estimate.regularization != 1) {
-    return;
-  }
+  const bool doubtful = findings.power < 1 || findings.shift > kInaccurateShift ||
+                        findings.windows.contradicted || estimate.regularization != 1;
   findings.drawn_to_curvature = Vector::Zero(std::ssize(estimate.parameters));
   for (Eigen::Index i = 0; i < findings.drawn_to_curvature.size(); ++i) {
     ParameterEstimate& parameter = estimate.parameters[static_cast<size_t>(i)];
     const double drawn = std::min(parameter.posterior_std_dev, parameter.prior_std_dev);
     const double ratio = drawn / parameter.std_dev;
-    if (ratio < kContradiction && ratio > 1 / kContradiction) continue;
+    if (ratio < kContradiction && (doubtful || ratio > 1 / kContradiction)) continue;
     findings.drawn_to_curvature[i] = ratio;
     parameter.std_dev = drawn;
     parameter.contraction = drawn / parameter.prior_std_dev;
@@ -134,11 +134,16 @@ std::vector<Places> PiecesOf(const std::vector<AssessmentRequest>& requests,
   return pieces;
 }
 
-// Returns the place of the piece's component with the least cost.
-size_t BestOf(const std::vector<Assessed>& components, const Places& places) {
-  return *std::ranges::min_element(places, {}, [&](size_t k) {
-    return components[k].estimate.cost.total + components[k].share.height;
-  });
+// Returns the place of the component that the piece's estimate is of.
+size_t BestOf(const std::vector<Assessed>& components, const std::vector<double>& weights,
+              const Places& places) {
+  std::vector<PieceComponent> candidates;
+  for (const size_t k : places) {
+    candidates.push_back({.cost = components[k].estimate.cost.total + components[k].share.height,
+                          .shift = components[k].findings.shift,
+                          .weight = weights[k]});
+  }
+  return places[ComponentOfEstimate(candidates)];
 }
 
 ComponentEstimate DescribePiece(const std::vector<Assessed>& components,
@@ -146,7 +151,7 @@ ComponentEstimate DescribePiece(const std::vector<Assessed>& components,
                                 const Prior& prior) {
   ComponentEstimate piece;
   for (const size_t k : places) piece.weight += weights[k];
-  piece.parameters = components[BestOf(components, places)].estimate.parameters;
+  piece.parameters = components[BestOf(components, weights, places)].estimate.parameters;
   if (places.size() == 1) return piece;
   const PosteriorDraws draws = Mix(components, weights, places);
   for (int i = 0; i < prior.dimension(); ++i) {
@@ -157,7 +162,7 @@ ComponentEstimate DescribePiece(const std::vector<Assessed>& components,
 
 Assessed Combine(const std::vector<Assessed>& components, const std::vector<double>& weights,
                  const std::vector<Places>& pieces, const ResolvedProblem& problem) {
-  const Assessed& best = components[BestOf(components, pieces.front())];
+  const Assessed& best = components[BestOf(components, weights, pieces.front())];
   Assessed whole;
   whole.estimate = best.estimate;
   whole.findings = best.findings;

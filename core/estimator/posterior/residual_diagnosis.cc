@@ -163,11 +163,17 @@ std::string ReasonNotLearned(const Findings& findings, size_t c) {
   }
   if (!model.unknown && !correlation) return "";
   if (!noise.learned) {
+    const int least = MinSamplesForNoise(findings.problem->dimension());
     const std::string why =
         model.unknown && channel.largest <= 0
             ? "all samples are 0, from which its noise cannot be learned"
-            : absl::StrFormat("too few samples (%d), fewer than %d, to learn its noise from",
-                              channel.samples, MinSamplesForNoise(findings.problem->dimension()));
+        : channel.samples < least
+            ? absl::StrFormat("too few samples (%d), fewer than %d, to learn its noise from",
+                              channel.samples, least)
+            : absl::StrFormat(
+                  "its noise has not been learned from its %d samples yet, which more "
+                  "rows bring about",
+                  channel.samples);
     return absl::StrCat(why, "; it is taken to be ",
                         model.unknown ? "as large as the signal"
                                       : "white, and if it is not, the uncertainty is too small");

@@ -4,11 +4,14 @@
 
 #include "core/estimator/posterior/noise_learning.h"
 
+#include <absl/strings/str_format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <random>
+#include <string>
+#include <vector>
 
 #include "core/bayes/noise.h"
 #include "tests/testing/oscillator.h"
@@ -125,6 +128,25 @@ TEST(UnknownScale, SaysThatItHasNotBeenLearnedFromFewSamples) {
               HasSubstr("too few samples (7), fewer than 8"));
   EXPECT_GT(estimate.channels[0].noise_std_dev, 1);  // about the size of the signal
   ExpectFinite(estimate);
+}
+
+// Whatever the number of unknowns, and at whichever rows windows end otherwise.
+TEST(UnknownScale, IsLearnedFromTheFewestSamplesThatSuffice) {
+  std::mt19937_64 generator(3);
+  std::normal_distribution<double> normal;
+  std::string output = "a0";
+  std::vector<UncertainParameter> unknowns = {UncertainParameter::Normal("a0", 0, 10).value()};
+  for (int n = 1; n <= 5; ++n) {
+    Problem problem = TextProblem(output, unknowns, 1);
+    problem.measured.front().noise = {.unknown = true};
+    std::vector<double> values(static_cast<size_t>(MinSamplesForNoise(n)));
+    for (double& value : values) value = 5 + normal(generator);
+    const Estimate estimate = Processed(problem, values)->CurrentEstimate().value();
+    EXPECT_FALSE(Has(estimate, DiagnosticCode::kNoiseNotLearned)) << n << " unknowns";
+    const std::string name = "a" + std::to_string(n);
+    output += absl::StrFormat(" + %s*cos(%d*t)", name, n);
+    unknowns.push_back(UncertainParameter::Normal(name, 0, 10).value());
+  }
 }
 
 TEST(UnknownScale, IsFoundInAnyUnit) {
