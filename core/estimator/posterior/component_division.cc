@@ -9,6 +9,7 @@
 #include "core/estimator/expansion/likelihood_power.h"
 #include "core/estimator/expansion/reexpansion.h"
 #include "core/estimator/posterior/bisection.h"
+#include "core/estimator/posterior/least_linear.h"
 #include "core/estimator/posterior/mixture_component.h"
 #include "core/estimator/problem/truncation.h"
 
@@ -82,10 +83,21 @@ bool MixtureComponent::MayBisect() const {
 
 // Returns true when the element is to be bisected.
 bool MixtureComponent::BisectElement() {
-  if (!MayBisect()) return false;
-  pieces_ = Bisect(*expansion_, particles_);
-  halves_ = true;
-  return true;
+  halves_ = MayBisect();
+  return halves_;
+}
+
+// Finds the halves of an element that is to be bisected.
+absl::Status MixtureComponent::Halve(const Stop& stop) {
+  LeastLinear found;
+  if (expansion_->absorbed_rows() > 0 && !HasTermsOfTheModel(*expansion_)) {
+    POLYEST_ASSIGN_OR_RETURN(
+        found, FindLeastLinear(problem_, *expansion_, *store_, taken_, threads_, stop));
+    abandoned_rows_ += found.propagated_rows;
+    allowance_.Use(taken_, taken_);
+  }
+  pieces_ = Bisect(*expansion_, found.germ, particles_);
+  return absl::OkStatus();
 }
 
 // After a row that the expansion does not follow, which has been taken with its discount: if the
@@ -98,6 +110,7 @@ absl::StatusOr<bool> MixtureComponent::ContractOrBisect(const Stop& stop) {
 
 absl::StatusOr<std::vector<std::unique_ptr<MixtureComponent>>> MixtureComponent::Divide(
     const Stop& stop) {
+  if (pieces_.empty()) POLYEST_RETURN_IF_ERROR(Halve(stop));
   std::vector<std::unique_ptr<MixtureComponent>> parts;
   const int room = std::max(1, room_ / static_cast<int>(pieces_.size()));
   for (const Piece& piece : pieces_) {

@@ -66,7 +66,7 @@ class MixtureComponent {
   // Whether a single expansion cannot represent the posterior, because this consists of separated
   // pieces or the model changes too much over the element. No more rows are taken until Divide has
   // been called.
-  bool must_divide() const { return !pieces_.empty(); }
+  bool must_divide() const { return halves_ || !pieces_.empty(); }
   // Returns a component for each piece, at the same row. Returns none if one of them could not be
   // expanded; this component then continues undivided.
   absl::StatusOr<std::vector<std::unique_ptr<MixtureComponent>>> Divide(const Stop& stop);
@@ -171,6 +171,7 @@ class MixtureComponent {
   bool LookForPieces();
   bool MayBisect() const;
   bool BisectElement();
+  absl::Status Halve(const Stop& stop);
   absl::StatusOr<bool> ContractOrBisect(const Stop& stop);
   absl::Status ExpandOn(const MixtureComponent& parent, const Piece& piece, const Stop& stop);
   absl::Status BeginOn(const MixtureComponent& parent, const Piece& piece, const Stop& stop);
@@ -186,9 +187,9 @@ class MixtureComponent {
   bool broken_ = false;        // whether a stop left the expansion between two rows
   Matrix particles_;           // of the last settlement, germ coordinates
   SettlementMemory memory_;    // and what they and earlier ones have found
-  std::vector<Piece> pieces_;  // those to divide into
+  std::vector<Piece> pieces_;  // those to divide into; halves are found by Divide
   bool contracts_ = false;     // whether the last row was too coarse and not dealt with yet
-  bool halves_ = false;        // whether the pieces are the halves of a bisection
+  bool halves_ = false;        // whether to divide into the halves of a bisection
   bool bisected_ = false;      // whether it came from a bisection; its order stays low
   int room_ = 1;
   double weight_ = 1;

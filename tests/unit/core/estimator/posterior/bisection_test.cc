@@ -5,9 +5,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <optional>
 #include <vector>
 
 #include "core/estimator/expansion/reexpansion.h"
+#include "core/estimator/posterior/least_linear.h"
 #include "core/estimator/posterior/noise_learning.h"
 #include "core/estimator/record/memory_store.h"
 #include "tests/unit/core/estimator/text_problem.h"
@@ -42,7 +44,11 @@ Vector NormalOfCut(double time_s, double value) {
   const auto expansion = Replay(problem, DesignForPrior(problem).value(),
                                 NoiseToBeginWith(problem.problem()), store, 1, 1, Stop())
                              .value();
-  const std::vector<Piece> halves = Bisect(*expansion, Matrix(0, problem.dimension()));
+  std::optional<Eigen::Index> germ;
+  if (!HasTermsOfTheModel(*expansion)) {
+    germ = FindLeastLinear(problem, *expansion, store, 1, 1, Stop()).value().germ;
+  }
+  const std::vector<Piece> halves = Bisect(*expansion, germ, Matrix(0, problem.dimension()));
   EXPECT_EQ(halves.size(), 2U);
   EXPECT_TRUE(halves[0].element.bounds()[0].IsOpposite(halves[1].element.bounds()[0]));
   return halves[0].element.bounds()[0].normal;
