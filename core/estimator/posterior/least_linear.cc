@@ -16,26 +16,27 @@ constexpr Eigen::Index kPointsOfLine = 6;  // three more than a quadratic has co
 constexpr double kLeftByRounding = 1e-4;
 
 // Returns the lines, germ by germ, a point a row: across the region and Ω, through points halfway
-// between the region's centre and the expansion's own points.
+// between the region's centre and the expansion's own points, which are in Ω.
 Matrix LinesIn(const Prior& prior, const ExpansionDesign& design) {
   const Eigen::Index n = design.points.cols();
   const Region region = TrustedRegion(design);
+  const Vector inside = NearestInside(prior, region.centre());
   const Matrix directions = Inverse(region.axes());  // column i is that of germ i
+  const Vector steps = (Vector::LinSpaced(kPointsOfLine, 0.5, kPointsOfLine - 0.5)) / kPointsOfLine;
   Matrix xis(n * kLines * kPointsOfLine, n);
   for (Eigen::Index germ = 0, row = 0; germ < n; ++germ) {
     const auto way = directions.col(germ).array();
-    for (Eigen::Index line = 0; line < kLines; ++line) {
+    for (Eigen::Index line = 0; line < kLines; ++line, row += kPointsOfLine) {
       const auto own = design.points.row(line * design.points.rows() / kLines).transpose();
-      const Vector eta = 0.5 * region.ToLocal(design.region.ToGerm(own));
-      const Vector xi = region.ToGerm(eta);
+      const Vector xi = 0.5 * (inside + design.region.ToGerm(own));
+      const Vector eta = region.ToLocal(xi);
       // |η + s way| ≤ 1
       const double back = ((1 + way.sign() * eta.array()) / way.abs()).minCoeff();
       const double forth = ((1 - way.sign() * eta.array()) / way.abs()).minCoeff();
-      const double lower = std::max(xi[germ] - back, prior.lower()[germ]);
-      const double upper = std::min(xi[germ] + forth, prior.upper()[germ]);
+      const double lower = std::max(xi[germ] - std::max(0.0, back), prior.lower()[germ]);
+      const double upper = std::min(xi[germ] + std::max(0.0, forth), prior.upper()[germ]);
       xis.middleRows(row, kPointsOfLine) = xi.transpose().replicate(kPointsOfLine, 1);
-      xis.col(germ).segment(row, kPointsOfLine) = Vector::LinSpaced(kPointsOfLine, lower, upper);
-      row += kPointsOfLine;
+      xis.col(germ).segment(row, kPointsOfLine) = lower + (upper - lower) * steps.array();
     }
   }
   return xis;

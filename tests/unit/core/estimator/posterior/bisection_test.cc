@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -65,6 +66,78 @@ TEST(Bisection, CutsTheFrequencyHoweverLateTheSignalIsSeen) {
           << "t = " << time_s << ", y = " << value;
     }
   }
+}
+
+// y = a cos(300 f) over a region in which no axis is that of f, with one row.
+class ObliqueRegion : public ::testing::Test {
+ protected:
+  static constexpr Eigen::Index kFrequencyOfTwo = 1;
+
+  void SetUp() override {
+    RowBlock block;
+    block.rows.push_back({0, 1});
+    block.values = {0.3};
+    block.noise = {kNoise};
+    ASSERT_TRUE(store_.Append(block).ok());
+    Matrix axes(2, 2);
+    axes << 0.5, -0.4, 0.3, 0.2;
+    Region region(Vector::Constant(2, 0.1), axes);
+    expansion_ = Replay(problem_, DesignForRegion(problem_, Truncation{}, region, region.centre()),
+                        NoiseToBeginWith(problem_.problem()), store_, 1, 1, Stop())
+                     .value();
+  }
+
+  const ResolvedProblem problem_ =
+      ResolvedProblem::Make(TextProblem("a*cos(300*f)",
+                                        {UncertainParameter::Normal("a", 1, 1).value(),
+                                         UncertainParameter::Uniform("f", 0, 1).value()},
+                                        kNoise))
+          .value();
+  MemoryStore store_;
+  std::unique_ptr<RegionalExpansion> expansion_;
+};
+
+TEST_F(ObliqueRegion, IsLeastLinearInTheFrequency) {
+  EXPECT_FALSE(HasTermsOfTheModel(*expansion_));
+  const LeastLinear found = FindLeastLinear(problem_, *expansion_, store_, 1, 1, Stop()).value();
+  EXPECT_EQ(found.germ, kFrequencyOfTwo);
+  EXPECT_EQ(found.propagated_rows, 2 * 4 * 6);
+}
+
+TEST_F(ObliqueRegion, IsCoveredByItsHalves) {
+  const Region whole = expansion_->design().region;
+  const std::vector<Piece> halves = Bisect(*expansion_, kFrequencyOfTwo, Matrix(0, 2));
+  double lengths = 0;
+  for (const Piece& half : halves) lengths += half.region.axes().row(1).cwiseAbs().sum();
+  EXPECT_NEAR(lengths, whole.axes().row(1).cwiseAbs().sum(), 1e-12);
+  for (double x = -1; x <= 1; x += 0.25) {
+    for (double y = -1; y <= 1; y += 0.25) {
+      const Vector xi = whole.ToGerm(Eigen::Vector2d(x, y));
+      for (const Piece& half : halves) {
+        if (!half.element.Contains(xi)) continue;
+        EXPECT_LE(half.region.ToLocal(xi).cwiseAbs().maxCoeff(), 1 + 1e-12) << xi.transpose();
+      }
+    }
+  }
+}
+
+TEST(LeastLinear, IsNoParameterOfALinearModel) {
+  const ResolvedProblem problem =
+      ResolvedProblem::Make(TextProblem("a + 3*b",
+                                        {UncertainParameter::Normal("a", 0, 1).value(),
+                                         UncertainParameter::Uniform("b", 0, 1).value()},
+                                        kNoise))
+          .value();
+  RowBlock block;
+  block.rows.push_back({0, 1});
+  block.values = {0.3};
+  block.noise = {kNoise};
+  MemoryStore store;
+  ASSERT_TRUE(store.Append(block).ok());
+  const auto expansion = Replay(problem, DesignForPrior(problem).value(),
+                                NoiseToBeginWith(problem.problem()), store, 1, 1, Stop())
+                             .value();
+  EXPECT_FALSE(FindLeastLinear(problem, *expansion, store, 1, 1, Stop()).value().germ);
 }
 
 }  // namespace
