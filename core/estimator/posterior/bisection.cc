@@ -43,9 +43,9 @@ Eigen::Index AxisOfFailures(const RegionalExpansion& expansion) {
   return axis;
 }
 
-// Returns the half of the region on one side, −1 or 1, of the cut normalᵀ(ξ − centre) = 0, or more
-// of it where the cut is oblique: along all axes but one, which is the whole way across the cut,
-// they are sheared until they lie in it.
+// Returns a region that covers the half of `whole` on one side, −1 or 1, of the cut
+// normalᵀ(ξ − centre) = 0. All axes but one are sheared until they lie in the cut; that one goes
+// halfway from the cut to the farthest point of the half.
 Region Half(const Region& whole, const Vector& normal, int side) {
   const Vector across = whole.axes().transpose() * normal;
   Eigen::Index most = 0;

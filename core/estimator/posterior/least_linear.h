@@ -21,8 +21,8 @@ struct LeastLinear {
   int64_t propagated_rows = 0;       // trajectories times rows
 };
 
-// Propagates the first `rows` rows of the store, which the expansion has absorbed, along kLines
-// lines for each germ. Returns the status of a stop request.
+// Propagates the first `rows` rows of the store, which the expansion has absorbed, along four lines
+// for each germ, of six points each. Returns an error only on a stop request.
 absl::StatusOr<LeastLinear> FindLeastLinear(const ResolvedProblem& problem,
                                             const RegionalExpansion& expansion,
                                             const SampleStore& store, int64_t rows, int threads,
