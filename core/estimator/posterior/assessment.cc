@@ -70,7 +70,8 @@ class Assessment {
         std::hypot(findings_.shift, findings_.integration_shift, findings_.population_shift);
     fitted_ = FittedParameters(design_.region.HessianToGerm(cost.MismatchHessian(eta)), prior_);
     spent_ = fitted_ + 2;
-    // By the draws before they are widened: farther from the minimum no noise explains the record.
+    // The noise is judged by the draws before they are widened: farther out, the residuals are
+    // those of the expansion.
     estimate_.channels = DescribeChannels(request_, cost, eta, posterior_, fitted_);
     WidenForShift();
     findings_.degrees = DegreesOfFreedom(request_, estimate_.channels, fitted_);

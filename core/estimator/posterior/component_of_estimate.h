@@ -1,7 +1,7 @@
 #pragma once
 
-// Chooses among components that make up one piece of the posterior that which the piece's estimate,
-// its minimum of the cost and the curvature there, is of.
+// Chooses the component whose minimum, and curvature there, are the estimate of a piece of the
+// posterior that several components share.
 
 #include <cstddef>
 #include <vector>

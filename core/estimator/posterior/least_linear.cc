@@ -12,7 +12,7 @@ namespace {
 
 constexpr Eigen::Index kLines = 4;         // for each germ
 constexpr Eigen::Index kPointsOfLine = 6;  // three more than a quadratic has coefficients
-// A part of χ² that rounding and the tolerance of the integration leave of a quadratic.
+// What rounding and errors of integration leave of a quadratic, relative to χ².
 constexpr double kLeftByRounding = 1e-4;
 
 // Returns the lines, germ by germ, a point a row: across the region and Ω, through points halfway

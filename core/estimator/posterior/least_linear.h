@@ -17,7 +17,7 @@
 namespace polyest::internal {
 
 struct LeastLinear {
-  std::optional<Eigen::Index> germ;  // nothing if no line tells one from the others
+  std::optional<Eigen::Index> germ;  // nothing if the outputs are linear along all lines
   int64_t propagated_rows = 0;       // trajectories times rows
 };
 

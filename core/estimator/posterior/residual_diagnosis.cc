@@ -171,8 +171,8 @@ std::string ReasonNotLearned(const Findings& findings, size_t c) {
             ? absl::StrFormat("too few samples (%d), fewer than %d, to learn its noise from",
                               channel.samples, least)
             : absl::StrFormat(
-                  "its noise has not been learned from its %d samples yet, which more "
-                  "rows bring about",
+                  "its noise has not been learned from its %d samples yet, but will be with more "
+                  "rows",
                   channel.samples);
     return absl::StrCat(why, "; it is taken to be ",
                         model.unknown ? "as large as the signal"

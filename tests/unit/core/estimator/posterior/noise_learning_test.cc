@@ -130,6 +130,22 @@ TEST(UnknownScale, SaysThatItHasNotBeenLearnedFromFewSamples) {
   ExpectFinite(estimate);
 }
 
+// Noise is learned where windows end. Of an output that lacks every other sample there may be
+// enough within one, and then that is said.
+TEST(UnknownScale, SaysThatItWillBeLearnedWithMoreRows) {
+  Problem problem = ProblemWith({.unknown = true});
+  problem.measured.push_back({"v", {.unknown = true}});
+  Samples record = Record(0.85, {});
+  record.columns.push_back({"v", record.columns[0].value, {}});
+  for (size_t row = 0; row < record.rows(); ++row) {
+    record.columns[1].missing.push_back(row % 2 == 0);
+  }
+  const std::string message =
+      Message(EstimateOf(problem, record), DiagnosticCode::kNoiseNotLearned);
+  EXPECT_THAT(message,
+              HasSubstr("output v: its noise has not been learned from its 8 samples yet"));
+}
+
 // Whatever the number of unknowns, and at whichever rows windows end otherwise.
 TEST(UnknownScale, IsLearnedFromTheFewestSamplesThatSuffice) {
   std::mt19937_64 generator(3);
