@@ -84,9 +84,9 @@ def anchors_of(text):
             for line in headings}
 
 
-# Processors round differently. What that does to an estimate of filters or of a noise's time constant,
-# which searches and draws decide, was up to 4 % of its value from one kind to another.
-BETWEEN_PROCESSORS = 0.05
+# Processors round differently. From one kind to another that moved the estimates of filters, which
+# searches and draws decide, by up to 0.43 %.
+BETWEEN_PROCESSORS = 0.005
 
 
 def same_number(expected, printed):

@@ -24,7 +24,7 @@ GUIDES = {
         (f"```sh\n{OSCILLATOR} --format json | head -c 13\n```\n\n```output\n{{\"directions\n```\n",
          "README.md:6: the command printed instead"),
     "a command prints another number":
-        ("```sh\necho k = 39.5\n```\n\n```output\nk = 41.7\n```\n",
+        ("```sh\necho k = 39.5\n```\n\n```output\nk = 39.8\n```\n",
          "README.md:6: the command printed instead"),
     "a program fails":
         ("```python\n# a.py\nraise SystemExit(3)\n```\n\n```sh\npython3 a.py\n```\n",
