@@ -131,9 +131,7 @@ TEST_P(AirTrackRecord, AgreesWithLeastSquaresOnTheExactModel) {
     ExpectNear(estimate.parameters[i], exact[i], 0.05, 0.1, 0.02,
                Has(estimate, DiagnosticCode::kCorrelatedResiduals));
   }
-  if (order == 3) {  // of order 2, AirTrackCopies judges the mean
-    EXPECT_LT(estimate.expansion.trajectories, 385);
-  }
+  EXPECT_LT(estimate.expansion.trajectories, order == 2 ? 153 : 385);
   RecordProperty("trajectories", static_cast<int>(estimate.expansion.trajectories));
   EXPECT_LT(estimate.expansion.residual_to_noise, 0.1);
 }
