@@ -188,6 +188,17 @@ def test_a_session_that_is_dropped_is_left_to_the_next_writer(client, problem, r
         assert other.session("dropped").append(rows(200, 300)) == 12
 
 
+def test_estimates_that_are_kept_do_not_keep_a_dropped_session(client, problem, rows):
+    told = []
+    session = client.session("kept-estimates", problem, on_estimate=told.append)
+    session.append(rows(0, 100))
+    asked = session.estimate()
+    wait_for(lambda: told)
+    del session
+    assert client.session("kept-estimates").append(rows(100, 200)) == 2
+    assert [one._studies().history().points[0].sequence for one in (asked, told[0])] == [1, 1]
+
+
 def test_rows_that_are_refused_are_named_and_the_session_goes_on(client, problem, rows):
     with client.session("refused", problem) as session:
         session.append(rows(0, 100))

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import os
 import sys
-import weakref
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from types import TracebackType
 from typing import TYPE_CHECKING, Optional, TypeVar, Union
 
 from polyest import _calls, _methods, estimates, info, results
-from polyest._calls import Call, Subject
+from polyest._calls import Call
 from polyest._measurements import MeasurementConverter, Measurements, split
-from polyest._proto.v1 import estimate_pb2, problem_pb2, session_service_pb2
+from polyest._proto.v1 import estimate_pb2, session_service_pb2
 from polyest._resume import StreamOptions
 from polyest._session_file import SessionFileWriter
 from polyest._stream import MeasurementStream
@@ -20,7 +19,7 @@ from polyest._table import Data
 from polyest.estimates import Estimate
 from polyest.problem import Problem, from_message
 from polyest.results import prediction
-from polyest.studies import Studies
+from polyest.session_studies import SessionStudies
 
 if TYPE_CHECKING:
     from polyest._transport import Transport
@@ -28,7 +27,7 @@ if TYPE_CHECKING:
 Result = TypeVar("Result")
 
 
-class Session(Studies):
+class Session(SessionStudies):
     """A session, and the stream that this program writes to it.
 
     As a context manager it ends the stream, not the session: the daemon keeps a session until it is
@@ -41,10 +40,8 @@ class Session(Studies):
                  on_estimate: Optional[Callable[[Estimate], None]]) -> None:
         """Use `Client.session`."""
         self._stream: Optional[MeasurementStream] = None
-        self._transport = transport
-        self._resource = created.name
-        self._problem_message = created.problem
-        self._units = units or {}
+        super().__init__(transport, created, units or {})
+        self._studies = SessionStudies(transport, created, self._units)
         self._options = options
         self._on_estimate = on_estimate
         self._converter = MeasurementConverter(created.problem, units,
@@ -114,9 +111,9 @@ class Session(Studies):
 
     def _teller(self, on_estimate: Callable[[Estimate], None]
                 ) -> Callable[[estimate_pb2.Estimate], None]:
-        """Returns what the stream calls; it does not keep the session, which may be dropped."""
-        known = weakref.ref(self)
-        return lambda message: on_estimate(estimates.of_message(message, known()))
+        """Returns what the stream calls; it does not keep this object, which may be dropped."""
+        studies = self._studies
+        return lambda message: on_estimate(estimates.of_message(message, studies))
 
     def __del__(self) -> None:
         """Leaves the session to the next writer. Rows on their way are still sent."""
@@ -167,7 +164,7 @@ class Session(Studies):
     def estimate(self) -> Estimate:
         """Returns the estimate from all rows so far."""
         self._settle()
-        return self._transport.run(_calls.get_estimate(self._resource, self))
+        return self._studies.estimate()
 
     def estimates(self, *, follow: bool = False) -> Iterator[Estimate]:
         """Yields the present estimate and then new ones, of which a slow loop gets the newest.
@@ -183,7 +180,7 @@ class Session(Studies):
         for response in self._transport.server_stream(_methods.WATCH_SESSION, request):
             if not response.HasField("estimate"):
                 continue
-            yield estimates.of_message(response.estimate, self)
+            yield estimates.of_message(response.estimate, self._studies)
             if not follow and response.estimate.sequence >= last:
                 return
 
@@ -204,11 +201,6 @@ class Session(Studies):
             if response.HasField("prediction"):
                 yield prediction.of_message(response.prediction)
 
-    def history(self) -> results.History:
-        """Returns how the session's estimates came about: at most 512 of them and the newest."""
-        self._settle()
-        return self._transport.run(_calls.get_history(self._resource))
-
     def export(self, file: Union[str, os.PathLike[str]]) -> None:
         """Writes the session to a file, as `polyest export`; `Client.import_session` reads it."""
         self._settle()
@@ -225,15 +217,9 @@ class Session(Studies):
         self._transport.unary(_methods.DELETE_SESSION,
                               session_service_pb2.DeleteSessionRequest(name=self._resource))
 
-    def _subject(self) -> Subject:
-        return _calls.subject_of_session(self._resource)
-
-    def _problem(self) -> problem_pb2.Problem:
-        return self._problem_message
-
     def _run(self, call: Call[Result]) -> Result:
         self._settle()
-        return self._transport.run(call)
+        return super()._run(call)
 
     def __repr__(self) -> str:
         return f"<polyest.Session '{self.name}' of {self._transport.options.server}>"
