@@ -1,7 +1,6 @@
 #include "server/journal/postgres_connection.h"
 
 #include <absl/strings/str_cat.h>
-#include <libpq-fe.h>
 #include <poll.h>
 #include <spdlog/spdlog.h>
 
@@ -10,6 +9,7 @@
 #include <utility>
 
 #include "core/common/status.h"
+#include "server/journal/libpq.h"
 #include "server/journal/postgres_status.h"
 
 namespace polyest::internal {
@@ -27,12 +27,12 @@ constexpr char kConnectTimeoutS[] = "5";
 constexpr char kTcpTimeoutMs[] = "10000";
 
 std::string_view Field(const PGresult* result, int field) {
-  const char* text = PQresultErrorField(result, field);
+  const char* text = Libpq().PQresultErrorField(result, field);
   return text == nullptr ? "" : text;
 }
 
 absl::Status StatusOf(const PGresult* result) {
-  switch (PQresultStatus(result)) {
+  switch (Libpq().PQresultStatus(result)) {
     case PGRES_COMMAND_OK:
     case PGRES_TUPLES_OK:
       return absl::OkStatus();
@@ -123,17 +123,17 @@ PostgresParameters& PostgresParameters::AddBytes(std::string_view bytes) {
   return *this;
 }
 
-PostgresResult::PostgresResult(pg_result* result) : result_(result, PQclear) {}
+PostgresResult::PostgresResult(pg_result* result) : result_(result, Libpq().PQclear) {}
 
-int PostgresResult::rows() const { return PQntuples(result_.get()); }
+int PostgresResult::rows() const { return Libpq().PQntuples(result_.get()); }
 
-int64_t PostgresResult::changes() const { return std::atoll(PQcmdTuples(result_.get())); }
+int64_t PostgresResult::changes() const { return std::atoll(Libpq().PQcmdTuples(result_.get())); }
 
-std::string_view PostgresResult::command() const { return PQcmdStatus(result_.get()); }
+std::string_view PostgresResult::command() const { return Libpq().PQcmdStatus(result_.get()); }
 
 int64_t PostgresResult::Integer(int row, int column) const {
-  if (PQgetlength(result_.get(), row, column) != 8) return 0;
-  return static_cast<int64_t>(BigEndian(PQgetvalue(result_.get(), row, column)));
+  if (Libpq().PQgetlength(result_.get(), row, column) != 8) return 0;
+  return static_cast<int64_t>(BigEndian(Libpq().PQgetvalue(result_.get(), row, column)));
 }
 
 double PostgresResult::Real(int row, int column) const {
@@ -141,13 +141,13 @@ double PostgresResult::Real(int row, int column) const {
 }
 
 bool PostgresResult::Flag(int row, int column) const {
-  return PQgetlength(result_.get(), row, column) == 1 &&
-         *PQgetvalue(result_.get(), row, column) != 0;
+  return Libpq().PQgetlength(result_.get(), row, column) == 1 &&
+         *Libpq().PQgetvalue(result_.get(), row, column) != 0;
 }
 
 std::string PostgresResult::Bytes(int row, int column) const {
-  return {PQgetvalue(result_.get(), row, column),
-          static_cast<size_t>(PQgetlength(result_.get(), row, column))};
+  return {Libpq().PQgetvalue(result_.get(), row, column),
+          static_cast<size_t>(Libpq().PQgetlength(result_.get(), row, column))};
 }
 
 absl::StatusOr<std::unique_ptr<PostgresConnection>> PostgresConnection::Open(
@@ -164,19 +164,19 @@ absl::StatusOr<std::unique_ptr<PostgresConnection>> PostgresConnection::Open(
   const char* const values[] = {"polyestd",           kConnectTimeoutS, kTcpTimeoutMs, "10",
                                 target.uri().c_str(), "read-write",     "UTF8",        nullptr};
   std::unique_ptr<PostgresConnection> connection(
-      new PostgresConnection(PQconnectdbParams(keys, values, /*expand_dbname=*/1)));
+      new PostgresConnection(Libpq().PQconnectdbParams(keys, values, /*expand_dbname=*/1)));
   POLYEST_RETURN_IF_ERROR(connection->SetUp());
   return connection;
 }
 
 PostgresConnection::PostgresConnection(pg_conn* connection) : connection_(connection) {}
 
-PostgresConnection::~PostgresConnection() { PQfinish(connection_); }
+PostgresConnection::~PostgresConnection() { Libpq().PQfinish(connection_); }
 
 absl::Status PostgresConnection::SetUp() {
-  if (PQstatus(connection_) != CONNECTION_OK) return Broken("no connection");
-  if (PQsetnonblocking(connection_, 1) != 0) return Broken("no connection");
-  PQsetNoticeReceiver(
+  if (Libpq().PQstatus(connection_) != CONNECTION_OK) return Broken("no connection");
+  if (Libpq().PQsetnonblocking(connection_, 1) != 0) return Broken("no connection");
+  Libpq().PQsetNoticeReceiver(
       connection_,
       [](void* self, const PGresult* notice) {
         if (Field(notice, PG_DIAG_SEVERITY_NONLOCALIZED) != "WARNING") return;
@@ -197,7 +197,7 @@ absl::Status PostgresConnection::SetUp() {
 
 absl::Status PostgresConnection::Broken(std::string_view what) {
   broken_ = true;
-  const std::string said = OneLine(PQerrorMessage(connection_));
+  const std::string said = OneLine(Libpq().PQerrorMessage(connection_));
   spdlog::warn("the database that keeps the sessions: {}{}{}", what, said.empty() ? "" : ": ",
                said);
   return DatabaseAway(what);
@@ -205,19 +205,19 @@ absl::Status PostgresConnection::Broken(std::string_view what) {
 
 absl::StatusOr<pg_result*> PostgresConnection::Next(Deadline deadline) {
   while (true) {
-    const int unsent = PQflush(connection_);
+    const int unsent = Libpq().PQflush(connection_);
     if (unsent < 0) return Broken("the connection was lost");
-    if (unsent == 0 && PQisBusy(connection_) == 0) return PQgetResult(connection_);
+    if (unsent == 0 && Libpq().PQisBusy(connection_) == 0) return Libpq().PQgetResult(connection_);
     const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(
         deadline - std::chrono::steady_clock::now());
     if (left.count() <= 0) return Broken("it does not answer");
-    pollfd wait{.fd = PQsocket(connection_),
+    pollfd wait{.fd = Libpq().PQsocket(connection_),
                 .events = static_cast<short>(unsent == 0 ? POLLIN : POLLIN | POLLOUT),
                 .revents = 0};
     if (poll(&wait, 1, static_cast<int>(left.count()) + 1) < 0 && errno != EINTR) {
       return Broken("the connection was lost");
     }
-    if ((wait.revents & ~POLLOUT) != 0 && PQconsumeInput(connection_) == 0) {
+    if ((wait.revents & ~POLLOUT) != 0 && Libpq().PQconsumeInput(connection_) == 0) {
       return Broken("the connection was lost");
     }
   }
@@ -235,13 +235,13 @@ absl::StatusOr<PostgresResult> PostgresConnection::Only() {
     last = PostgresResult(result);
     if (failure.ok()) failure = StatusOf(result);
   }
-  if (PQstatus(connection_) != CONNECTION_OK) return Broken("the connection was lost");
+  if (Libpq().PQstatus(connection_) != CONNECTION_OK) return Broken("the connection was lost");
   POLYEST_RETURN_IF_ERROR(failure);
   return last;
 }
 
 absl::Status PostgresConnection::Execute(const std::string& sql) {
-  if (PQsendQuery(connection_, sql.c_str()) == 0) return Broken("the connection was lost");
+  if (Libpq().PQsendQuery(connection_, sql.c_str()) == 0) return Broken("the connection was lost");
   return Only().status();
 }
 
@@ -252,8 +252,8 @@ absl::StatusOr<std::string> PostgresConnection::Prepare(const char* sql,
   std::vector<Oid> types;
   for (const auto& value : parameters.values_) types.push_back(value.type);
   std::string name = absl::StrCat("s", prepared_.size());
-  if (PQsendPrepare(connection_, name.c_str(), sql, static_cast<int>(types.size()), types.data()) ==
-      0) {
+  if (Libpq().PQsendPrepare(connection_, name.c_str(), sql, static_cast<int>(types.size()),
+                            types.data()) == 0) {
     return Broken("the connection was lost");
   }
   POLYEST_RETURN_IF_ERROR(Only().status());
@@ -268,8 +268,9 @@ absl::Status PostgresConnection::SendPrepared(const std::string& name,
     values.push_back(value.data());
     sizes.push_back(value.size);
   }
-  if (PQsendQueryPrepared(connection_, name.c_str(), static_cast<int>(values.size()), values.data(),
-                          sizes.data(), formats.data(), /*resultFormat=*/1) == 0) {
+  if (Libpq().PQsendQueryPrepared(connection_, name.c_str(), static_cast<int>(values.size()),
+                                  values.data(), sizes.data(), formats.data(),
+                                  /*resultFormat=*/1) == 0) {
     return Broken("the connection was lost");
   }
   return absl::OkStatus();
@@ -288,15 +289,15 @@ absl::StatusOr<std::vector<PostgresResult>> PostgresConnection::Pipeline(
   for (const PostgresStatement& statement : statements) {
     POLYEST_ASSIGN_OR_RETURN(names.emplace_back(), Prepare(statement.sql, statement.parameters));
   }
-  if (PQenterPipelineMode(connection_) == 0) return Broken("no pipeline");
+  if (Libpq().PQenterPipelineMode(connection_) == 0) return Broken("no pipeline");
   for (size_t i = 0; i < statements.size(); ++i) {
     POLYEST_RETURN_IF_ERROR(SendPrepared(names[i], statements[i].parameters));
   }
-  if (PQpipelineSync(connection_) == 0) return Broken("the connection was lost");
+  if (Libpq().PQpipelineSync(connection_) == 0) return Broken("the connection was lost");
   std::vector<PostgresResult> results;
   const absl::Status read = ReadPipeline(statements.size(), results, refused);
   if (broken_) return read;
-  if (PQexitPipelineMode(connection_) == 0) return Broken("the pipeline does not end");
+  if (Libpq().PQexitPipelineMode(connection_) == 0) return Broken("the pipeline does not end");
   POLYEST_RETURN_IF_ERROR(read);
   return results;
 }
@@ -309,11 +310,11 @@ absl::Status PostgresConnection::ReadPipeline(size_t count, std::vector<Postgres
   while (true) {
     POLYEST_ASSIGN_OR_RETURN(pg_result* const given, Next(deadline));
     if (given == nullptr) {
-      if (PQstatus(connection_) != CONNECTION_OK) return Broken("the connection was lost");
+      if (Libpq().PQstatus(connection_) != CONNECTION_OK) return Broken("the connection was lost");
       continue;
     }
     PostgresResult result(given);
-    const ExecStatusType status = PQresultStatus(given);
+    const ExecStatusType status = Libpq().PQresultStatus(given);
     if (status == PGRES_PIPELINE_SYNC) break;
     if (status == PGRES_PIPELINE_ABORTED) continue;
     if (failure.ok()) {
@@ -321,7 +322,7 @@ absl::Status PostgresConnection::ReadPipeline(size_t count, std::vector<Postgres
       refused = {results.size(), Field(given, PG_DIAG_SQLSTATE) == "23505"};
       if (failure.ok()) results.push_back(std::move(result));
     }
-    if (PQstatus(connection_) != CONNECTION_OK) return Broken("the connection was lost");
+    if (Libpq().PQstatus(connection_) != CONNECTION_OK) return Broken("the connection was lost");
   }
   if (failure.ok() && results.size() != count) return Broken("answers are missing");
   return failure;

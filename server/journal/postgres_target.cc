@@ -2,10 +2,12 @@
 
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
-#include <libpq-fe.h>
 
 #include <map>
 #include <memory>
+
+#include "core/common/status.h"
+#include "server/journal/libpq.h"
 
 namespace polyest::internal {
 namespace {
@@ -38,10 +40,11 @@ std::string LabelOf(const Settings& settings) {
 }  // namespace
 
 absl::StatusOr<PostgresTarget> PostgresTarget::Parse(const std::string& uri) {
+  POLYEST_RETURN_IF_ERROR(LoadLibpq());
   char* error = nullptr;
   const std::unique_ptr<PQconninfoOption, decltype(&PQconninfoFree)> options(
-      PQconninfoParse(uri.c_str(), &error), PQconninfoFree);
-  PQfreemem(error);  // it may quote a part of the URI that was meant as a password
+      Libpq().PQconninfoParse(uri.c_str(), &error), Libpq().PQconninfoFree);
+  Libpq().PQfreemem(error);  // it may quote a part of the URI that was meant as a password
   // libpq would take a password with a "/" in it for a port, and find that out too late.
   if (!IsPostgresUri(uri) || options == nullptr || !HasGoodPort(SettingsOf(options.get()))) {
     return absl::InvalidArgumentError(

@@ -12,7 +12,8 @@ class PostgresTarget {
  public:
   // Parses `postgresql://…`. INVALID_ARGUMENT, without the text of the URI, when libpq cannot read
   // it, and when it holds a password: passwords are read from the file that `passfile` or
-  // PGPASSFILE names, so that no list of processes and no log shows them.
+  // PGPASSFILE names, so that no list of processes and no log shows them. FAILED_PRECONDITION when
+  // libpq is not installed.
   static absl::StatusOr<PostgresTarget> Parse(const std::string& uri);
 
   const std::string& uri() const { return uri_; }

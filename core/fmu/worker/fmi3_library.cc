@@ -1,10 +1,10 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/common/shared_library.h"
 #include "core/common/status.h"
 #include "core/fmu/worker/binding.h"
 #include "core/fmu/worker/fmi3_api.h"
-#include "core/fmu/worker/shared_library.h"
 
 namespace polyest::internal {
 namespace {
@@ -224,7 +224,7 @@ class Fmi3Library final : public FmuLibrary {
 absl::StatusOr<std::unique_ptr<FmuLibrary>> LoadFmi3(const FmuInterface& interface,
                                                      const std::string& library,
                                                      const std::string& resources) {
-  POLYEST_ASSIGN_OR_RETURN(SharedLibrary loaded, SharedLibrary::Load(library));
+  POLYEST_ASSIGN_OR_RETURN(SharedLibrary loaded, SharedLibrary::Load(library, "its library"));
   auto fmu = std::make_unique<Fmi3Library>(std::move(loaded), interface, resources);
   POLYEST_RETURN_IF_ERROR(fmu->Bind());
   return fmu;

@@ -5,14 +5,17 @@
 
 #include <memory>
 #include <string>
+#include <utility>
 
 namespace polyest::internal {
 
-// A library loaded into this process. Only workers load libraries.
+// A library that is loaded into this process while it runs: an FMU's, or one that few users need
+// and that would make every start longer.
 class SharedLibrary {
  public:
-  // Loads the library. Returns FailedPrecondition with the loader's message if that fails.
-  static absl::StatusOr<SharedLibrary> Load(const std::string& path);
+  // Loads a library, given by its path or the name that the loader looks for; `what` names it in
+  // errors. Returns FailedPrecondition with the loader's message if that fails.
+  static absl::StatusOr<SharedLibrary> Load(const std::string& path, std::string what);
 
   // Sets `function` to the library's function of that name. Returns FailedPrecondition if there is
   // none.
@@ -29,11 +32,12 @@ class SharedLibrary {
     void operator()(void* handle) const;
   };
 
-  explicit SharedLibrary(void* handle) : handle_(handle) {}
+  SharedLibrary(void* handle, std::string what) : handle_(handle), what_(std::move(what)) {}
   void* Find(const char* name) const;
-  static absl::Status Missing(const char* name);
+  absl::Status Missing(const char* name) const;
 
   std::unique_ptr<void, Unload> handle_;
+  std::string what_;
 };
 
 }  // namespace polyest::internal
