@@ -209,8 +209,8 @@ absl::Status Assembly::Assemble() {
 
 Programs Assembly::Compile(const std::vector<Lookup>& tables) {
   Programs programs{Program(graph_, initial_, places_, tables),
-                    Program(graph_, derivatives_, places_, tables),
-                    Program(graph_, outputs_, places_, tables),
+                    Program(graph_, derivatives_, places_, tables, kParametersBlock),
+                    Program(graph_, outputs_, places_, tables, kParametersBlock),
                     std::nullopt,
                     Structure(graph_, derivatives_),
                     places_,
@@ -219,7 +219,7 @@ Programs Assembly::Compile(const std::vector<Lookup>& tables) {
   graph_.set_most_nodes(kMaxJacobianNodes);
   const std::vector<NodeId> jacobian = Differentiate(graph_, derivatives_, states_);
   if (graph_.exhausted()) return programs;
-  programs.jacobian = Program(graph_, jacobian, places_, tables);
+  programs.jacobian = Program(graph_, jacobian, places_, tables, kParametersBlock);
   if (programs.jacobian->registers() > kMaxRegisters) programs.jacobian.reset();
   return programs;
 }
@@ -248,12 +248,12 @@ SwitchingPrograms Assembly::CompileSwitching(const std::vector<Lookup>& tables) 
   for (const std::string& input : read_.inputs) variables.push_back(names_.at(input));
   const std::vector<NodeId> slopes = Differentiate(graph, freezer.arguments(), variables);
   if (graph.exhausted() || freezer.kinds().size() > kMaxSwitches) return {};
-  SwitchingPrograms programs{freezer.kinds(),
-                             false,
-                             Program(graph, derivatives, places, tables),
-                             Program(graph, outputs, places, tables),
-                             Program(graph, freezer.arguments(), places, tables),
-                             Program(graph, slopes, places, tables)};
+  const auto compile = [&](const std::vector<NodeId>& roots) {
+    return Program(graph, roots, places, tables, kParametersBlock);
+  };
+  SwitchingPrograms programs{
+      freezer.kinds(), false, compile(derivatives), compile(outputs), compile(freezer.arguments()),
+      compile(slopes)};
   // The arguments are part of the right-hand sides, but not of those whose modes are frozen.
   const NodeId time = names_.at("t");
   programs.changes_at_rest = !read_.inputs.empty() || DependOn(graph_, derivatives_, time);

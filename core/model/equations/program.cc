@@ -1,6 +1,8 @@
 #include "core/model/equations/program.h"
 
 #include <algorithm>
+#include <array>
+#include <cstring>
 
 #include "core/common/check.h"
 
@@ -20,7 +22,52 @@ Scratch& ThreadScratch(size_t slots, Eigen::Index registers) {
   return scratch;
 }
 
+// What a program has computed of some parameters.
+struct OfParameters {
+  std::int64_t program = 0;
+  Eigen::Index row = 0, rows = 0;
+  Eigen::ArrayXd parameters;  // the columns that it reads, of kRows rows each
+  Eigen::ArrayXd values;      // of kRows rows each
+};
+
+// Returns the place of this thread for such values, where those of another program may be. The
+// programs of a model have successive numbers.
+OfParameters& ThreadOfParameters(std::int64_t program) {
+  thread_local std::array<OfParameters, 8> places;
+  return places[static_cast<size_t>(program) % places.size()];
+}
+
 }  // namespace
+
+void Program::UseParameters(const ConstBlock& parameters, Eigen::Index row, Eigen::Index rows,
+                            double** slots) const {
+  OfParameters& known = ThreadOfParameters(id_);
+  bool same = known.program == id_ && known.row == row && known.rows == rows;
+  if (known.values.size() < kept_ * kRows) known.values.resize(kept_ * kRows);
+  if (const auto size = std::ssize(parameter_columns_) * kRows; known.parameters.size() < size) {
+    known.parameters.resize(size);
+  }
+  const size_t bytes = static_cast<size_t>(rows) * sizeof(double);
+  double* copy = known.parameters.data();
+  for (const Eigen::Index column : parameter_columns_) {
+    const double* const given = parameters.data() + column * parameters.outerStride() + row;
+    if (!same || std::memcmp(copy, given, bytes) != 0) {
+      std::memcpy(copy, given, bytes);
+      same = false;
+    }
+    copy += kRows;
+  }
+  for (std::uint32_t i = 0; i < kept_; ++i) {
+    slots[first_kept_ + i] = known.values.data() + i * kRows;
+  }
+  if (same) return;
+  known.program = id_;
+  known.row = row;
+  known.rows = rows;
+  for (const Instruction& instruction : of_parameters_) {
+    instruction.kernel(instruction, slots, rows);
+  }
+}
 
 void Program::Run(double time_s, std::span<const ConstBlock* const> blocks, Block results) const {
   const Eigen::Index rows = results.rows();
@@ -53,6 +100,9 @@ void Program::Run(double time_s, std::span<const ConstBlock* const> blocks, Bloc
       slots[first_result_ + column] = results.data() + column * results.outerStride() + row;
     }
     const Eigen::Index chunk = std::min(kRows, rows - row);
+    if (!of_parameters_.empty()) {
+      UseParameters(*blocks[static_cast<size_t>(parameters_)], row, chunk, slots);
+    }
     for (const Instruction& instruction : instructions_) {
       instruction.kernel(instruction, slots, chunk);
     }

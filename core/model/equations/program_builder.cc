@@ -1,7 +1,9 @@
 // Compiles graphs into programs.
 
 #include <algorithm>
+#include <atomic>
 #include <limits>
+#include <map>
 
 #include "core/common/check.h"
 #include "core/model/equations/program.h"
@@ -10,6 +12,8 @@ namespace polyest::internal::equations {
 namespace {
 
 constexpr std::uint32_t kNowhere = std::numeric_limits<std::uint32_t>::max();
+// Most values of parameters alone that are kept; each takes 512 bytes per thread.
+constexpr std::uint32_t kMaxKept = 512;
 
 // A node as it is computed: a product may be fused with a sum where that saves an instruction.
 struct Step {
@@ -18,7 +22,9 @@ struct Step {
   int uses = 0;       // number of steps and roots that read it
   int last_use = -1;  // position of the last instruction that reads it
   bool needed = false;
-  bool of_time = false;  // whether all that it depends on is the time
+  bool of_time = false;        // whether all that it depends on is the time
+  bool of_parameters = false;  // whether it depends on parameters, and on nothing else
+  bool kept = false;           // of parameters, and read by what is not, or a root
   std::uint32_t slot = kNowhere;
 };
 
@@ -27,14 +33,20 @@ struct Step {
 class ProgramBuilder {
  public:
   ProgramBuilder(const Graph& graph, const std::vector<NodeId>& roots,
-                 const std::vector<VariablePlace>& places, const std::vector<Lookup>& tables)
-      : graph_(graph), roots_(roots), places_(places), tables_(tables) {}
+                 const std::vector<VariablePlace>& places, const std::vector<Lookup>& tables,
+                 int parameters)
+      : graph_(graph), roots_(roots), places_(places), tables_(tables), parameters_(parameters) {}
 
   Program Build() {
+    static std::atomic<std::int64_t> count = 0;
+    program_.id_ = ++count;
     CountUses();
+    FindThoseOfParameters();
+    TakeReciprocals();
     Fuse();
     for (const NodeId root : roots_) Order(root);
     FindThoseOfTime();
+    FindWhatIsKept();
     PlaceOperands();
     PlaceResults();
     Emit();
@@ -44,18 +56,23 @@ class ProgramBuilder {
  private:
   Step& step(NodeId id) { return steps_[static_cast<size_t>(id)]; }
   const Step& step(NodeId id) const { return steps_[static_cast<size_t>(id)]; }
-  bool IsLeaf(NodeId id) const { return Operands(graph_.node(id).operation) == 0; }
+  bool IsLeaf(NodeId id) const { return Operands(step(id).operation) == 0; }
 
   void CountUses();
+  void FindThoseOfParameters();
+  void TakeReciprocals();
+  NodeId ReciprocalOf(NodeId divisor);
   void Fuse();
   bool Draw(NodeId sum, Operation operation, NodeId product, NodeId other);
   void Order(NodeId root);
   void FindThoseOfTime();
+  void FindWhatIsKept();
   void PlaceOperands();
   void PlaceLeaf(NodeId id);
   void PlaceResults();
   void Emit();
   void EmitStep(NodeId id, int position);
+  void NoteParameterColumns();
   Instruction InstructionOf(NodeId id) const;
   bool IsUniform(std::uint32_t slot) const {
     return slot < 1 + program_.constants_.size() + static_cast<size_t>(of_time_);
@@ -65,7 +82,9 @@ class ProgramBuilder {
   const std::vector<NodeId>& roots_;
   const std::vector<VariablePlace>& places_;
   const std::vector<Lookup>& tables_;
-  std::vector<Step> steps_;
+  const int parameters_;
+  std::vector<Step> steps_;  // the nodes of the graph, and reciprocals
+  std::map<NodeId, NodeId> reciprocals_;
   std::vector<NodeId> order_;  // the nodes to compute, operands first
   int of_time_ = 0;            // number of steps of the time alone
   std::vector<std::uint32_t> free_registers_;
@@ -91,6 +110,51 @@ void ProgramBuilder::CountUses() {
   }
 }
 
+void ProgramBuilder::FindThoseOfParameters() {
+  for (NodeId id = 0; id < graph_.size(); ++id) {
+    const Node& node = graph_.node(id);
+    if (node.operation == Operation::kVariable) {
+      step(id).of_parameters = places_[static_cast<size_t>(node.index)].block == parameters_;
+      continue;
+    }
+    bool any = false, others = false;
+    for (const NodeId operand : node.operands) {
+      if (operand < 0) continue;
+      any = any || step(operand).of_parameters;
+      others = others || !(step(operand).of_parameters || graph_.IsConstant(operand));
+    }
+    step(id).of_parameters = any && !others;
+  }
+}
+
+// Makes x/p, where only p is of the parameters alone, x (1/p).
+void ProgramBuilder::TakeReciprocals() {
+  for (NodeId id = 0; id < graph_.size(); ++id) {
+    const auto [x, p, none] = step(id).operands;
+    if (!step(id).needed || step(id).operation != Operation::kDivide || step(id).of_parameters ||
+        !step(p).of_parameters) {
+      continue;
+    }
+    const NodeId reciprocal = ReciprocalOf(p);
+    --step(p).uses;
+    ++step(reciprocal).uses;
+    step(id).operation = Operation::kMultiply;
+    step(id).operands[1] = reciprocal;
+  }
+}
+
+NodeId ProgramBuilder::ReciprocalOf(NodeId divisor) {
+  const auto [found, is_new] =
+      reciprocals_.try_emplace(divisor, static_cast<NodeId>(steps_.size()));
+  if (is_new) {
+    steps_.push_back({Operation::kDivide, {Graph::kOne, divisor, -1}});
+    steps_.back().needed = steps_.back().of_parameters = true;
+    ++step(divisor).uses;
+    ++step(Graph::kOne).uses;
+  }
+  return found->second;
+}
+
 void ProgramBuilder::Fuse() {
   for (NodeId id = 0; id < graph_.size(); ++id) {
     if (!step(id).needed) continue;
@@ -105,9 +169,11 @@ void ProgramBuilder::Fuse() {
 }
 
 // Fuses `product` into `sum`: makes `sum` the operation on the factors of `product` and the other
-// term. Returns false if `product` is not a product or has other uses.
+// term. Returns false if `product` is not a product, has other uses or need not be computed each
+// time.
 bool ProgramBuilder::Draw(NodeId sum, Operation operation, NodeId product, NodeId other) {
   if (step(product).operation != Operation::kMultiply || step(product).uses != 1) return false;
+  if (step(product).of_parameters && !step(sum).of_parameters) return false;
   const auto [a, b, none] = step(product).operands;
   step(sum).operation = operation;
   step(sum).operands[0] = a;
@@ -141,10 +207,10 @@ void ProgramBuilder::Order(NodeId root) {
 
 void ProgramBuilder::FindThoseOfTime() {
   const auto depends_on_time_only = [this](NodeId id) {
-    const Node& node = graph_.node(id);
-    if (node.operation == Operation::kConstant) return true;
-    if (node.operation != Operation::kVariable) return step(id).of_time;
-    return places_[static_cast<size_t>(node.index)].block == VariablePlace::kTime;
+    if (step(id).operation == Operation::kConstant) return true;
+    if (step(id).operation != Operation::kVariable) return step(id).of_time;
+    const auto variable = static_cast<size_t>(graph_.node(id).index);
+    return places_[variable].block == VariablePlace::kTime;
   };
   for (const NodeId id : order_) {
     Step& current = step(id);
@@ -152,6 +218,26 @@ void ProgramBuilder::FindThoseOfTime() {
       return operand < 0 || depends_on_time_only(operand);
     });
     if (current.of_time) ++of_time_;
+  }
+}
+
+void ProgramBuilder::FindWhatIsKept() {
+  std::uint32_t kept = 0;
+  const auto keep = [&](NodeId id) {
+    Step& value = step(id);
+    if (!value.of_parameters || IsLeaf(id) || value.kept) return;
+    value.kept = true;
+    ++kept;
+  };
+  for (const NodeId root : roots_) keep(root);
+  for (const NodeId id : order_) {
+    if (step(id).of_parameters) continue;
+    for (const NodeId operand : step(id).operands) {
+      if (operand >= 0) keep(operand);
+    }
+  }
+  if (kept > kMaxKept) {
+    for (Step& one : steps_) one.of_parameters = one.kept = false;
   }
 }
 
@@ -172,8 +258,8 @@ void ProgramBuilder::PlaceLeaf(NodeId id) {
   step(id).slot = static_cast<std::uint32_t>(program_.loads_.size() - 1);
 }
 
-// Places the constants first, because the slots of the steps of the time alone and then those of
-// the loads begin where those of the constants end.
+// Places the constants first, because the slots of the steps of the time alone, those of what is
+// kept and then those of the loads begin where those of the constants end.
 void ProgramBuilder::PlaceOperands() {
   std::vector<NodeId> leaves;
   for (const NodeId id : order_) {
@@ -191,6 +277,11 @@ void ProgramBuilder::PlaceOperands() {
   for (const NodeId id : order_) {
     if (step(id).of_time) step(id).slot = first_load++;
   }
+  program_.first_kept_ = first_load;
+  for (const NodeId id : order_) {
+    if (step(id).kept) step(id).slot = first_load++;
+  }
+  program_.kept_ = first_load - program_.first_kept_;
   for (const NodeId id : leaves) {
     if (graph_.IsConstant(id) || step(id).slot != kNowhere) continue;
     const size_t loads = program_.loads_.size();
@@ -256,18 +347,24 @@ void ProgramBuilder::EmitStep(NodeId id, int position) {
     current.slot = free_registers_.back();
     free_registers_.pop_back();
   }
-  program_.instructions_.push_back(InstructionOf(id));
+  auto& instructions = current.of_parameters ? program_.of_parameters_ : program_.instructions_;
+  instructions.push_back(InstructionOf(id));
 }
 
+// Emits the steps of the parameters alone before all others: they may use the same registers.
 void ProgramBuilder::Emit() {
-  for (size_t position = 0; position < order_.size(); ++position) {
-    const NodeId id = order_[position];
-    if (step(id).of_time) {
-      program_.of_time_.push_back(InstructionOf(id));
-    } else {
-      EmitStep(id, static_cast<int>(position));
+  for (const bool of_parameters : {true, false}) {
+    for (size_t position = 0; position < order_.size(); ++position) {
+      const NodeId id = order_[position];
+      if (step(id).of_parameters != of_parameters) continue;
+      if (step(id).of_time) {
+        program_.of_time_.push_back(InstructionOf(id));
+      } else {
+        EmitStep(id, static_cast<int>(position));
+      }
     }
   }
+  NoteParameterColumns();
   for (size_t i = 0; i < roots_.size(); ++i) {
     const std::uint32_t column = program_.first_result_ + static_cast<std::uint32_t>(i);
     if (roots_[i] == Graph::kZero) {
@@ -279,8 +376,24 @@ void ProgramBuilder::Emit() {
   }
 }
 
+void ProgramBuilder::NoteParameterColumns() {
+  program_.parameters_ = parameters_;
+  for (const NodeId id : order_) {
+    if (!step(id).of_parameters) continue;
+    for (const NodeId operand : step(id).operands) {
+      if (operand < 0 || step(operand).operation != Operation::kVariable) continue;
+      const auto variable = static_cast<size_t>(graph_.node(operand).index);
+      program_.parameter_columns_.push_back(places_[variable].column);
+    }
+  }
+  auto& columns = program_.parameter_columns_;
+  std::ranges::sort(columns);
+  columns.erase(std::unique(columns.begin(), columns.end()), columns.end());
+}
+
 Program::Program(const Graph& graph, const std::vector<NodeId>& roots,
-                 const std::vector<VariablePlace>& places, const std::vector<Lookup>& tables)
-    : Program(ProgramBuilder(graph, roots, places, tables).Build()) {}
+                 const std::vector<VariablePlace>& places, const std::vector<Lookup>& tables,
+                 int parameters)
+    : Program(ProgramBuilder(graph, roots, places, tables, parameters).Build()) {}
 
 }  // namespace polyest::internal::equations

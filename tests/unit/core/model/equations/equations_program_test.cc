@@ -111,6 +111,65 @@ TEST(EquationProgram, ComputesWhatDependsOnTheTimeAloneOnceForAllRows) {
   }
 }
 
+// Compiles expressions of the states x, y and the parameters p, q.
+Program OfParameters(const std::vector<std::string>& texts, bool keeps = true) {
+  Graph graph(1000);
+  std::map<std::string, NodeId> names;
+  std::vector<VariablePlace> places;
+  for (const char* name : {"x", "y", "p", "q"}) {
+    names[name] = graph.Variable(static_cast<int>(places.size()));
+    places.push_back({places.size() < 2 ? 0 : 1, std::ssize(places) % 2});
+  }
+  std::vector<NodeId> roots;
+  for (const std::string& text : texts) {
+    roots.push_back(*Lower(*Parse("text", text, {}), names, {}, graph));
+  }
+  return Program(graph, roots, places, {}, keeps ? 1 : Program::kNone);
+}
+
+const std::vector<std::string> kOfParameters = {"x*(p + q)^2 + y/(p*q)", "y/(p*q) - x/q", "exp(p)",
+                                                "p", "x + p*q"};
+
+TEST(EquationProgram, SeparatesWhatDependsOnTheParametersAlone) {
+  const Program program = OfParameters(kOfParameters);
+  // p + q, its square, p q, exp(p) and the reciprocals of p q and q.
+  EXPECT_EQ(program.instructions_of_parameters(), 6);
+  // y/(p q), three sums, two of them with a product, and two copies.
+  EXPECT_EQ(program.instructions(), 6);
+  EXPECT_EQ(OfParameters(kOfParameters, false).instructions_of_parameters(), 0);
+}
+
+Eigen::ArrayXXd Evaluate(const Program& program, const Eigen::ArrayXXd& states,
+                         const Eigen::ArrayXXd& parameters) {
+  Eigen::ArrayXXd results(states.rows(), program.results());
+  const ConstBlock of_states(states), of_parameters(parameters);
+  const std::array<const ConstBlock*, 2> blocks = {&of_states, &of_parameters};
+  program.Run(0, blocks, results);
+  return results;
+}
+
+// The oracles are a program that has kept nothing yet, for the bits, and one that keeps nothing.
+TEST(EquationProgram, ComputesWhatDependsOnTheParametersAgainWhereTheseChange) {
+  const Program program = OfParameters(kOfParameters);
+  const Program plain = OfParameters(kOfParameters, false);
+  Eigen::ArrayXXd states(Program::kRows + 2 * kLanes, 2), parameters(states.rows(), 2);
+  parameters.setConstant(1.5);
+  for (int run = 0; run < 40; ++run) {
+    states.setRandom();
+    if (run % 3 == 0) parameters(run, run % 2) += 0.1;
+    if (run % 5 == 0) Evaluate(OfParameters({"x*sqrt(q)"}), states, parameters);
+    if (run == 30) {
+      states.conservativeResize(3 * kLanes, 2);
+      parameters.conservativeResize(3 * kLanes, 2);
+    }
+    const Eigen::ArrayXXd results = Evaluate(program, states, parameters);
+    const Program fresh = OfParameters(kOfParameters);
+    EXPECT_TRUE((results == Evaluate(fresh, states, parameters)).all()) << run;
+    // A reciprocal and a product round once more than a quotient, of terms of at most 10.
+    EXPECT_LT((results - Evaluate(plain, states, parameters)).abs().maxCoeff(), 4e-15) << run;
+  }
+}
+
 TEST(EquationProgram, ComputesConstantsVariablesAndZeros) {
   const Shared shared({"0", "2", "b", "b", "a + b"});
   const Program program = shared.Compile();
