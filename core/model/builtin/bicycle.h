@@ -36,6 +36,7 @@
 #include <limits>
 
 #include "core/model/lane.h"
+#include "core/model/vector_functions.h"
 #include "polyest/model.h"
 
 namespace polyest::internal::builtin {
@@ -119,7 +120,6 @@ struct Bicycle {
   static std::array<Real, 2> LateralForces(const std::array<Real, kStates>& states,
                                            const std::array<Real, kParameters>& parameters,
                                            const std::array<Real, kInputs>& inputs) {
-    using std::cos;
     constexpr double g = 9.81;
     const auto& [vy, r] = states;
     const auto& [m, Iz, lf, lr, Cf, Cr, mu, vy_0, r_0] = parameters;
@@ -131,7 +131,7 @@ struct Bicycle {
     // mu Fz
     const Real grip_front = mu * (m * g * lr / (lf + lr));
     const Real grip_rear = mu * (m * g * lf / (lf + lr));
-    return {TyreForce<Real>(Cf * slip_front, grip_front) * cos(delta),
+    return {TyreForce<Real>(Cf * slip_front, grip_front) * Cos(delta),
             TyreForce<Real>(Cr * slip_rear, grip_rear)};
   }
 

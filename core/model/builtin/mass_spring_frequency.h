@@ -3,7 +3,7 @@
 #include <array>
 #include <numbers>
 
-#include "core/model/lane.h"
+#include "core/model/vector_functions.h"
 #include "polyest/model.h"
 
 namespace polyest::internal::builtin {

@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 
+#include "core/model/vector_functions.h"
 #include "polyest/model.h"
 
 namespace polyest::internal::builtin {
@@ -45,12 +46,11 @@ struct Pendulum {
                           const std::array<Real, kInputs>&,
                           std::array<Real, kStates>& derivatives) {
     using std::abs;
-    using std::sin;
     const auto& [theta, omega] = states;
     const auto& [g_over_l, c, c2, theta0, omega0] = parameters;
     // ω̇ = −(g/ℓ) sin θ − (c + c2 |ω|) ω
     derivatives[0] = omega;
-    derivatives[1] = -g_over_l * sin(theta) - (c + c2 * abs(omega)) * omega;
+    derivatives[1] = -g_over_l * Sin(theta) - (c + c2 * abs(omega)) * omega;
   }
 
   template <class Real>

@@ -1,13 +1,13 @@
 #pragma once
 
-// Each operation applied to kLanes points. Where Eigen has no vector instruction, the standard
-// library's function is applied point by point. A point therefore gets the same bits in any lane.
+// Each operation applied to kLanes points. A point gets the same bits in any lane.
 
 #include <cmath>
 #include <functional>
 
 #include "core/model/equations/operation.h"
 #include "core/model/lane.h"
+#include "core/model/vector_functions.h"
 
 namespace polyest::internal::equations {
 
@@ -30,20 +30,6 @@ struct LaneFunction;
     static Lane Apply(const Lane& a, const Lane& b, const Lane& c) { return expression; } \
   };
 
-template <double (*function)(double)>
-Lane PointByPoint(const Lane& a) {
-  Lane result;
-  for (int i = 0; i < kLanes; ++i) result[i] = function(a[i]);
-  return result;
-}
-
-template <double (*function)(double, double)>
-Lane PointByPoint(const Lane& a, const Lane& b) {
-  Lane result;
-  for (int i = 0; i < kLanes; ++i) result[i] = function(a[i], b[i]);
-  return result;
-}
-
 // Returns 1 where the relation holds and 0 elsewhere. Plain loops are used because the compiler
 // vectorizes them with masks, unlike Eigen's select().
 template <class Relation>
@@ -64,32 +50,14 @@ inline Lane Select(const Lane& condition, const Lane& a, const Lane& b) {
 // Returns NaN if either operand is NaN.
 inline Lane Minimum(const Lane& a, const Lane& b) {
   Lane result;
-  for (int i = 0; i < kLanes; ++i) result[i] = a[i] < b[i] || a[i] != a[i] ? a[i] : b[i];
+  for (int i = 0; i < kLanes; ++i) result[i] = (a[i] < b[i]) | (a[i] != a[i]) ? a[i] : b[i];
   return result;
 }
 
 inline Lane Maximum(const Lane& a, const Lane& b) {
   Lane result;
-  for (int i = 0; i < kLanes; ++i) result[i] = a[i] > b[i] || a[i] != a[i] ? a[i] : b[i];
+  for (int i = 0; i < kLanes; ++i) result[i] = (a[i] > b[i]) | (a[i] != a[i]) ? a[i] : b[i];
   return result;
-}
-
-// For |x| < 0.625 evaluates Lambert's continued fraction x/(1 + x²/(3 + x²/(5 + …))) truncated
-// after 17, with an error of |x|¹⁷/(17·15!!²) < 1e-17 |x|. Otherwise evaluates (e^{2|x|} −
-// 1)/(e^{2|x|} + 1) with the sign of x, which rounds to 1 beyond 20.
-inline Lane HyperbolicTangent(const Lane& x) {
-  const Lane s = x * x;
-  const Lane near_numerator = x * ((((s + 990) * s + 135135) * s + 4729725) * s + 34459425);
-  const Lane near_denominator = (((45 * s + 13860) * s + 945945) * s + 16216200) * s + 34459425;
-  const Lane size = x.abs();
-  const Lane power = (2 * Minimum(size, Lane::Constant(20))).exp();
-  Lane numerator, denominator;
-  for (int i = 0; i < kLanes; ++i) {
-    const double far = x[i] < 0 ? 1 - power[i] : power[i] - 1;
-    numerator[i] = size[i] < 0.625 ? near_numerator[i] : far;
-    denominator[i] = size[i] < 0.625 ? near_denominator[i] : power[i] + 1;
-  }
-  return numerator / denominator;
 }
 
 // Returns −1, 0 or 1, and NaN for NaN.
@@ -100,9 +68,14 @@ inline Lane Sign(const Lane& x) {
 }
 
 // Returns the remainder of the division that rounds down; it has the sign of the divisor.
-inline double Modulo(double a, double b) {
-  const double remainder = std::fmod(a, b);
-  return remainder != 0 && (remainder < 0) != (b < 0) ? remainder + b : remainder;
+inline Lane Modulo(const Lane& a, const Lane& b) {
+  Lane result;
+  for (int i = 0; i < kLanes; ++i) {
+    const double remainder = std::fmod(a[i], b[i]);
+    const bool other_sign = remainder != 0 && (remainder < 0) != (b[i] < 0);
+    result[i] = other_sign ? remainder + b[i] : remainder;
+  }
+  return result;
 }
 
 POLYEST_UNARY(kNegate, -a)
@@ -111,16 +84,16 @@ POLYEST_UNARY(kAbsolute, a.abs())
 POLYEST_UNARY(kSign, Sign(a))
 POLYEST_UNARY(kSquareRoot, Sqrt(a))
 POLYEST_UNARY(kExponential, a.exp())
-POLYEST_UNARY(kLogarithm, PointByPoint<std::log>(a))
-POLYEST_UNARY(kLogarithm10, PointByPoint<std::log10>(a))
-POLYEST_UNARY(kSine, PointByPoint<std::sin>(a))
-POLYEST_UNARY(kCosine, PointByPoint<std::cos>(a))
-POLYEST_UNARY(kTangent, PointByPoint<std::tan>(a))
-POLYEST_UNARY(kArcSine, PointByPoint<std::asin>(a))
-POLYEST_UNARY(kArcCosine, PointByPoint<std::acos>(a))
-POLYEST_UNARY(kArcTangent, PointByPoint<std::atan>(a))
-POLYEST_UNARY(kHyperbolicSine, PointByPoint<std::sinh>(a))
-POLYEST_UNARY(kHyperbolicCosine, PointByPoint<std::cosh>(a))
+POLYEST_UNARY(kLogarithm, Log(a))
+POLYEST_UNARY(kLogarithm10, Log10(a))
+POLYEST_UNARY(kSine, Sin(a))
+POLYEST_UNARY(kCosine, Cos(a))
+POLYEST_UNARY(kTangent, Tan(a))
+POLYEST_UNARY(kArcSine, Asin(a))
+POLYEST_UNARY(kArcCosine, Acos(a))
+POLYEST_UNARY(kArcTangent, Atan(a))
+POLYEST_UNARY(kHyperbolicSine, Sinh(a))
+POLYEST_UNARY(kHyperbolicCosine, Cosh(a))
 POLYEST_UNARY(kHyperbolicTangent, HyperbolicTangent(a))
 POLYEST_UNARY(kFloor, a.floor())
 POLYEST_UNARY(kCeiling, a.ceil())
@@ -129,12 +102,12 @@ POLYEST_BINARY(kAdd, a + b)
 POLYEST_BINARY(kSubtract, a - b)
 POLYEST_BINARY(kMultiply, a* b)
 POLYEST_BINARY(kDivide, a / b)
-POLYEST_BINARY(kPower, PointByPoint<std::pow>(a, b))
+POLYEST_BINARY(kPower, Pow(a, b))
 POLYEST_BINARY(kMinimum, Minimum(a, b))
 POLYEST_BINARY(kMaximum, Maximum(a, b))
-POLYEST_BINARY(kArcTangent2, PointByPoint<std::atan2>(a, b))
-POLYEST_BINARY(kHypotenuse, PointByPoint<std::hypot>(a, b))
-POLYEST_BINARY(kModulo, PointByPoint<Modulo>(a, b))
+POLYEST_BINARY(kArcTangent2, Atan2(a, b))
+POLYEST_BINARY(kHypotenuse, Hypot(a, b))
+POLYEST_BINARY(kModulo, Modulo(a, b))
 POLYEST_BINARY(kLess, Truth(a, b, std::less<>()))
 POLYEST_BINARY(kLessOrEqual, Truth(a, b, std::less_equal<>()))
 POLYEST_BINARY(kEqual, Truth(a, b, std::equal_to<>()))
