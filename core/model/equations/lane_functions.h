@@ -47,17 +47,13 @@ inline Lane Select(const Lane& condition, const Lane& a, const Lane& b) {
   return result;
 }
 
-// Returns NaN if either operand is NaN.
+// Returns NaN if either operand is NaN: a comparison with it is false.
 inline Lane Minimum(const Lane& a, const Lane& b) {
-  Lane result;
-  for (int i = 0; i < kLanes; ++i) result[i] = (a[i] < b[i]) | (a[i] != a[i]) ? a[i] : b[i];
-  return result;
+  return ByPacks([](Pack x, Pack y) { return x == x ? (x < y ? x : y) : x; }, a, b);
 }
 
 inline Lane Maximum(const Lane& a, const Lane& b) {
-  Lane result;
-  for (int i = 0; i < kLanes; ++i) result[i] = (a[i] > b[i]) | (a[i] != a[i]) ? a[i] : b[i];
-  return result;
+  return ByPacks([](Pack x, Pack y) { return x == x ? (x > y ? x : y) : x; }, a, b);
 }
 
 // Returns −1, 0 or 1, and NaN for NaN.
