@@ -9,6 +9,7 @@
 
 #include "core/common/check.h"
 #include "core/model/builtin/duffing.h"
+#include "core/model/builtin/pendulum.h"
 #include "core/model/equations/equation_model.h"
 #include "core/model/lane_model.h"
 #include "tests/bench/half_car.h"
@@ -79,6 +80,11 @@ int Main() {
           {.states = {{"x", "v"}, {"v", "(force + offset - c*v - (k + (k2 + k3*x)*x)*x)/m"}},
            .outputs = {{"x", "x"}, {"v", "v"}},
            .inputs = {"force"}});
+  Compare("pendulum", LaneModel<builtin::Pendulum>(),
+          {.states = {{"theta", "omega"},
+                      {"omega", "-g_over_l*sin(theta) - (c + c2*abs(omega))*omega"}},
+           .outputs = {{"angle", "theta"}, {"rate", "omega"}},
+           .parameters = {{"g_over_l", 1}, {"c", 1}, {"c2", 1}}});
   return 0;
 }
 
