@@ -30,18 +30,18 @@ struct OfParameters {
   Eigen::ArrayXd values;      // of kRows rows each
 };
 
-// Returns the place of this thread for such values, where those of another program may be. The
-// programs of a model have successive numbers.
-OfParameters& ThreadOfParameters(std::int64_t program) {
-  thread_local std::array<OfParameters, 8> places;
-  return places[static_cast<size_t>(program) % places.size()];
+// Returns the place of this thread for such values, where those of another program may be. There is
+// room for two chunks of each of eight programs; those of a model have successive numbers.
+OfParameters& ThreadOfParameters(std::int64_t program, Eigen::Index row) {
+  thread_local std::array<OfParameters, 16> places;
+  return places[static_cast<size_t>(2 * program + row / Program::kRows) % places.size()];
 }
 
 }  // namespace
 
 void Program::UseParameters(const ConstBlock& parameters, Eigen::Index row, Eigen::Index rows,
                             double** slots) const {
-  OfParameters& known = ThreadOfParameters(id_);
+  OfParameters& known = ThreadOfParameters(id_, row);
   bool same = known.program == id_ && known.row == row && known.rows == rows;
   if (known.values.size() < kept_ * kRows) known.values.resize(kept_ * kRows);
   if (const auto size = std::ssize(parameter_columns_) * kRows; known.parameters.size() < size) {
