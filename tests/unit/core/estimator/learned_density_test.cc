@@ -86,14 +86,20 @@ TEST(LearnedDensity, IsAveragedOverWhereThereIsNoProcessNoise) {
     EXPECT_GT(deviation, 0.95 * std_dev[i]);
     EXPECT_LT(deviation, (inaccurate ? 1.25 : 1.05) * std_dev[i]);
   }
-  // The cost hardly depends on densities below the limit, so that its curvature says nothing.
+  // The cost hardly depends on densities below the limit, so that its curvature says nothing, and
+  // where its minimum lies is a matter of rounding. A standard deviation that contradicts that of
+  // the draws by a factor of 2 is replaced by it (kContradiction of diagnosis.h).
   const ParameterEstimate& density = fine.parameters[2];
   EXPECT_NEAR(std::log(density.upper95), UpperLogarithm(grid), 0.1);
-  EXPECT_EQ(density.std_dev, density.posterior_std_dev);
+  EXPECT_LE(density.std_dev, 2 * density.posterior_std_dev);
+  EXPECT_GE(density.std_dev, 0.5 * density.posterior_std_dev);
   EXPECT_NEAR(fine.covariance(2, 2), std::pow(density.std_dev, 2),
               1e-9 * std::pow(density.std_dev, 2));
-  EXPECT_THAT(Message(fine, DiagnosticCode::kNonGaussian),
-              HasSubstr("what is reported is the posterior's"));
+  const bool replaced = density.std_dev == density.posterior_std_dev;
+  EXPECT_THAT(
+      Message(fine, DiagnosticCode::kNonGaussian),
+      HasSubstr(replaced ? "what is reported is the posterior's"
+                         : "go by the posterior's own mean, standard deviation and interval"));
   EXPECT_FALSE(Has(fine, DiagnosticCode::kMultipleMinima));
 }
 
