@@ -3,6 +3,7 @@
 #include <absl/strings/str_cat.h>
 
 #include <cmath>
+#include <utility>
 
 #include "client/cpp/data/cells.h"
 #include "core/common/status.h"
@@ -96,9 +97,11 @@ absl::Status RowClock::Next(const CellTime& time, int32_t run, absl::string_view
     return Error(cell, time_s, "≥ 0; --time-zero first lets the time begin at the first row");
   }
   if (!begins && time_s <= time_s_ && !options_.any_order) {
+    const bool again = std::exchange(went_back_, true);
     return Error(
         cell, time_s,
-        absl::StrCat("later than ", time_s_, " of the row before",
+        absl::StrCat("later than ", time_s_,
+                     again ? ", where the time went back" : " of the row before",
                      time_s < time_s_ ? "; a new run needs a column run that changes" : ""));
   }
   if (rows_ == 0) {
@@ -109,6 +112,7 @@ absl::Status RowClock::Next(const CellTime& time, int32_t run, absl::string_view
   from_first_row_ = from_first;
   if (from_first && begins) zero_ = time;
   time_s_ = time_s;
+  went_back_ = false;
   run_ = run;
   ++rows_;
   return absl::OkStatus();

@@ -31,8 +31,8 @@ class RowClock {
 
   // Reads the text of a time that is not a plain number.
   absl::Status Read(absl::string_view text, CellTime& time);
-  // Sets the time and the run of the next row; `cell` is its time for messages. Changes nothing
-  // after an error.
+  // Sets the time and the run of the next row; `cell` is its time for messages. After an error the
+  // row does not count.
   absl::Status Next(const CellTime& time, int32_t run, absl::string_view cell);
 
   double time_s() const { return time_s_; }  // of the last row
@@ -57,6 +57,7 @@ class RowClock {
   std::string first_cell_;
   bool from_first_row_ = false;
   double time_s_ = 0;
+  bool went_back_ = false;  // of the rows after it, which do not count
   double first_time_s_ = 0;
   int32_t run_ = 0;
   int64_t rows_ = 0;

@@ -310,6 +310,17 @@ TEST(DataReader, GoesOnAfterABadLineIfAsked) {
   EXPECT_THAT(sieved.data->channels(1).missing(), ElementsAre(0, 1));
 }
 
+TEST(DataReader, SaysOfTheRowsAfterAClockWentBackFromWhereItDid) {
+  const Sieved sieved =
+      Sieve("t,x,v,run\n0,1,1,0\n5,1,1,0\n1,1,1,0\n2,1,1,0\n6,1,1,0\n5.5,1,1,0\n");
+  EXPECT_THAT(
+      sieved.refusals,
+      ElementsAre(HasSubstr("data.csv:4: column t: 1 must be later than 5 of the row before"),
+                  HasSubstr("data.csv:5: column t: 2 must be later than 5, where the time "
+                            "went back; a new run needs a column run that changes"),
+                  HasSubstr("data.csv:7: column t: 5.5 must be later than 6 of the row before")));
+}
+
 TEST(DataReader, GoesOnAfterABadColumnIfAsked) {
   const Sieved sieved = Sieve("t,v,x,x\n0,1,a,b\n1,?,a,b\n", kColumns);
   EXPECT_THAT(sieved.refusals, ElementsAre(HasSubstr("\"x\" is named twice"),
