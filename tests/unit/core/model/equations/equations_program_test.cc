@@ -156,7 +156,7 @@ TEST(EquationProgram, ComputesWhatDependsOnTheParametersAgainWhereTheseChange) {
   parameters.setConstant(1.5);
   for (int run = 0; run < 40; ++run) {
     states.setRandom();
-    if (run % 3 == 0) parameters(run, run % 2) += 0.1;
+    if (run % 3 == 0) parameters(run % (3 * kLanes), run % 2) += 0.1;
     if (run % 5 == 0) Evaluate(OfParameters({"x*sqrt(q)"}), states, parameters);
     if (run == 30) {
       states.conservativeResize(3 * kLanes, 2);
