@@ -15,8 +15,8 @@ struct PieceComponent {
 };
 
 // Returns the index of the component with the least cost. Those whose expansions do not follow the
-// model may show a minimum where the model has none: they are left out, unless more than half of
-// the weight is theirs. `components` must not be empty.
+// model may show a minimum where the model has none: they are left out, as long as those at least
+// as accurate have half of the weight. `components` must not be empty.
 size_t ComponentOfEstimate(const std::vector<PieceComponent>& components);
 
 }  // namespace polyest::internal

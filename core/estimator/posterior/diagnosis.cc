@@ -264,14 +264,18 @@ void AddInaccuracy(const Findings& findings, const Estimate& estimate,
              remedy)});
   } else if (findings.shift > kInaccurateShift && !findings.IntegrationPrevails() &&
              !findings.PopulationPrevails()) {
+    const bool in_part = findings.inaccurate_weight < 0.995;
+    const std::string place =
+        in_part ? absl::StrFormat(" in %.2g %% of the posterior", 100 * findings.inaccurate_weight)
+                : "";
     diagnostics.push_back(
         {DiagnosticCode::kExpansionInaccurate,
          absl::StrFormat(
              "the expansion of order %d differs from the model by %.3g times the noise; "
-             "estimates may be off by %.3g standard deviations of the fit, by which the "
-             "uncertainty has been widened; %s",
-             estimate.expansion.order, estimate.expansion.residual_to_noise, findings.shift,
-             remedy)});
+             "estimates may be off by %s%.3g standard deviations of the fit%s, by which the "
+             "uncertainty has been widened%s; %s",
+             estimate.expansion.order, estimate.expansion.residual_to_noise,
+             in_part ? "up to " : "", findings.shift, place, in_part ? " there" : "", remedy)});
   }
 }
 

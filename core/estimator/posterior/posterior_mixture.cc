@@ -89,8 +89,8 @@ void DescribeWhole(const Prior& prior, const PosteriorDraws& posterior, const Fi
 }
 
 // The curvature at the minimum is that of one component. Where it contradicts the draws of several
-// that are one piece of the posterior, the draws count if they are the wider ones, or if nothing
-// speaks against them.
+// that are one piece of the posterior, the draws count. Where something speaks against them, the
+// wider of both counts.
 void GoByDraws(Findings& findings, Estimate& estimate) {
   const bool doubtful = findings.power < 1 || findings.shift > kInaccurateShift ||
                         findings.windows.contradicted || estimate.regularization != 1;
@@ -99,7 +99,8 @@ void GoByDraws(Findings& findings, Estimate& estimate) {
     ParameterEstimate& parameter = estimate.parameters[static_cast<size_t>(i)];
     const double drawn = std::min(parameter.posterior_std_dev, parameter.prior_std_dev);
     const double ratio = drawn / parameter.std_dev;
-    if (ratio < kContradiction && (doubtful || ratio > 1 / kContradiction)) continue;
+    const bool contradicts = ratio >= kContradiction || ratio <= 1 / kContradiction;
+    if (doubtful ? ratio <= 1 : !contradicts) continue;
     findings.drawn_to_curvature[i] = ratio;
     parameter.std_dev = drawn;
     parameter.contraction = drawn / parameter.prior_std_dev;
@@ -167,12 +168,14 @@ Assessed Combine(const std::vector<Assessed>& components, const std::vector<doub
   whole.estimate = best.estimate;
   whole.findings = best.findings;
   whole.findings.drawn_to_curvature = {};  // its draws are not those of the whole
+  whole.findings.inaccurate_weight = 0;
   ExpansionSummary& expansion = whole.estimate.expansion;
   Places all;
   for (size_t k = 0; k < components.size(); ++k) {
     all.push_back(k);
-    if (weights[k] < kMinWeightToWarn) continue;
     const Findings& findings = components[k].findings;
+    if (findings.shift > kInaccurateShift) whole.findings.inaccurate_weight += weights[k];
+    if (weights[k] < kMinWeightToWarn) continue;
     expansion.residual_to_noise =
         std::max(expansion.residual_to_noise, components[k].estimate.expansion.residual_to_noise);
     whole.findings.shift = std::max(whole.findings.shift, findings.shift);

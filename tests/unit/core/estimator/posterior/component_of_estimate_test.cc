@@ -26,5 +26,14 @@ TEST(ComponentOfEstimate, HasTheLeastCostWhereTheExpansionsThatFollowAreOfLittle
   EXPECT_EQ(ComponentOfEstimate({{.cost = 3, .shift = 2}, {.cost = 2, .shift = 1}}), 1);
 }
 
+// Those at least as accurate as 0.3 have 0.55 of the weight; that of the least cost has 0.05.
+TEST(ComponentOfEstimate, IsAmongTheMoreAccurateHalfWhereNoneIsAccurate) {
+  EXPECT_EQ(ComponentOfEstimate({{.cost = 1, .shift = 8, .weight = 0.05},
+                                 {.cost = 2, .shift = 0.6, .weight = 0.4},
+                                 {.cost = 3, .shift = 0.3, .weight = 0.2},
+                                 {.cost = 4, .shift = 0.1, .weight = 0.35}}),
+            2);
+}
+
 }  // namespace
 }  // namespace polyest::internal
