@@ -17,7 +17,7 @@
 namespace polyest::internal {
 namespace {
 
-using ::testing::HasSubstr;
+using ::testing::ContainsRegex;
 using Model = double (*)(double);
 
 constexpr int kSamples = 3;  // of each run
@@ -130,7 +130,7 @@ TEST(SkewedPopulations, SayHowFarTheyMayBeOff) {
       "exp(2*v)", [](double v) { return std::exp(2 * v); }, 1, 2, 1);
   const Estimate estimate = EstimateOf(campaign.MakeProblem(), campaign.samples);
   const GridOracle exact(campaign);
-  EXPECT_THAT(InaccuracyOf(estimate), HasSubstr("estimates may be off by 0."));
+  EXPECT_THAT(InaccuracyOf(estimate), ContainsRegex("estimates may be off by (up to )?0\\."));
   EXPECT_NEAR(ParameterOf(estimate, "v.mean").mean, exact.mean.mean(),
               0.4 * exact.mean.deviation());
   EXPECT_NEAR(ParameterOf(estimate, "v.spread").mean, exact.spread.mean(),
