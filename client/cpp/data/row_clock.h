@@ -57,7 +57,7 @@ class RowClock {
   std::string first_cell_;
   bool from_first_row_ = false;
   double time_s_ = 0;
-  bool went_back_ = false;  // of the rows after it, which do not count
+  bool went_back_ = false;  // whether a row after the last one was refused for its time
   double first_time_s_ = 0;
   int32_t run_ = 0;
   int64_t rows_ = 0;

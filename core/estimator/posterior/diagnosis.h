@@ -62,12 +62,12 @@ struct Findings {
   std::vector<Vector> other_minima;  // θ of other minima with comparable cost
   double left_out = 0;               // share of mixture components dropped for lack of room
   double shift = 0;                  // bound on the error of a mean, in standard deviations
+  double integration_shift = 0;      // the part of it that the integration causes
+  double population_shift = 0;       // the part of it that ended runs of a population cause
+  double carried_shift = 0;          // the part of it that sums taken over cause
   // Posterior probability of the components whose shift exceeds kInaccurateShift, of several.
   double inaccurate_weight = 1;
-  double integration_shift = 0;  // the part of it that the integration causes
-  double population_shift = 0;   // the part of it that ended runs of a population cause
-  double carried_shift = 0;      // the part of it that sums taken over cause
-  Postponed postponed;           // what the limit on rows propagated again has put off
+  Postponed postponed;  // what the limit on rows propagated again has put off
   // Power of the likelihood that the posterior was taken from ÷ that which the residuals allow.
   double power = 1;
   bool leans = false;        // whether the posterior goes on beyond the region of the expansion

@@ -31,7 +31,7 @@ struct VariablePlace {
 class Program {
  public:
   static constexpr Eigen::Index kRows = 64;
-  static constexpr int kNone = -2;
+  static constexpr int kNone = -2;  // no block
 
   Program() = default;
   // Compiles a program that writes the value of roots[i] into column i of the results. places[i]
@@ -71,7 +71,7 @@ class Program {
   std::vector<Load> loads_;
   std::vector<double> constants_;
   std::vector<Eigen::Index> zero_;  // columns of the results that are always 0
-  std::int64_t id_ = 0;             // of the same program and its copies
+  std::int64_t id_ = 0;             // which only copies of a program share
   int parameters_ = kNone;
   std::vector<Eigen::Index> parameter_columns_;  // those that of_parameters_ reads
   // Order of the slots: the time, the constants, the results of of_time_, what is kept of those of
