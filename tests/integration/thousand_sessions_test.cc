@@ -131,12 +131,20 @@ struct Memory {
   int64_t resident = ResidentMemoryBytes();
 };
 
+constexpr bool kSanitized = POLYEST_ADDRESS_SANITIZER || POLYEST_THREAD_SANITIZER;
+
 // What threads have not let go of yet when a round ends comes and goes, and a thread that works for
 // the first time keeps buffers of its own; what sessions leave behind stays, and grows. So five
 // hundred sessions that end above the limit are followed by others, which a leak would not let end
-// below it.
+// below it. A sanitizer's own memory grows with the memory that was freed, but it finds what a
+// hundred sessions have left, and races between them, as well as of a thousand.
 TEST_F(ThousandSessionsTest, LeaveNothingBehind) {
   constexpr int kMostTries = 4;
+  if (kSanitized) {
+    LiveThrough();
+    daemon_->Stop();
+    return;
+  }
   const auto above_limit = [](const Memory& full, const Memory& half) {
     return full.allocated - half.allocated >= 500 * 1'000 ||
            full.resident - half.resident >= 500 * 16'384;
@@ -153,10 +161,7 @@ TEST_F(ThousandSessionsTest, LeaveNothingBehind) {
   }
   RecordProperty("allocated_growth_bytes", std::to_string(full.allocated - half.allocated));
   RecordProperty("resident_growth_bytes", std::to_string(full.resident - half.resident));
-#if !POLYEST_ADDRESS_SANITIZER && !POLYEST_THREAD_SANITIZER
-  // A sanitizer's own memory grows with the memory that was freed.
   EXPECT_FALSE(above_limit(full, half));
-#endif
   daemon_->Stop();
 }
 

@@ -104,7 +104,7 @@ TEST(Snapshot, HoldsWhatWasTriedInVain) {
   const Problem problem = TextProblem("sin(40*a) + 0*(b + c + d + e)", parameters, 0.2);
   const auto constant = [](double) { return 0.5; };
   const Outcome outcome =
-      ExpectSameBitsThroughRestarts(problem, Record("y", constant, 0.02, 160), 40);
+      ExpectSameBitsThroughRestarts(problem, Record("y", constant, 0.02, 160), 80);
   EXPECT_TRUE(Has(outcome.estimates.back(), DiagnosticCode::kExpansionInaccurate));
 }
 
@@ -219,7 +219,7 @@ TEST(Snapshot, HoldsRunsWhoseParametersHaveBeenEliminated) {
   Problem problem = OscillatorProblem();
   problem.uncertain[1].per_run = true;
   problem.measured[0].noise.unknown = true;
-  const Outcome outcome = ExpectSameBitsThroughRestarts(problem, OscillatorRecord(16, 16), 37);
+  const Outcome outcome = ExpectSameBitsThroughRestarts(problem, OscillatorRecord(16, 16), 90);
   ASSERT_THAT(outcome.estimates.back().parameters, SizeIs(2));
   EXPECT_EQ(outcome.estimates.back().parameters[1].name, "x0[15]");
 }
