@@ -6,25 +6,18 @@
 namespace polyest::internal::equations {
 namespace {
 
-// Reads an operand: kLanes rows starting at `row`, or one value for all rows.
-template <bool uniform>
+// Reads an operand, kLanes rows starting at `row`.
 class Operand {
  public:
-  explicit Operand(const double* values) : values_(values) {}
-  Lane At(Eigen::Index row) const { return Eigen::Map<const Lane>(values_ + row); }
+  Operand(const Instruction& instruction, int number, const double* const* slots)
+      : values_(slots[instruction.operands[number]]), mask_(instruction.masks[number]) {}
+
+  Lane At(Eigen::Index row) const { return Eigen::Map<const Lane>(values_ + (row & mask_)); }
+  double ValueAt(Eigen::Index row) const { return values_[row & mask_]; }
 
  private:
   const double* values_;
-};
-
-template <>
-class Operand<true> {
- public:
-  explicit Operand(const double* values) : value_(Lane::Constant(*values)) {}
-  const Lane& At(Eigen::Index) const { return value_; }
-
- private:
-  const Lane value_;
+  Eigen::Index mask_;
 };
 
 // Stores the values of `function` for all rows, kLanes rows at a time.
@@ -35,145 +28,140 @@ void ForRows(double* result, Eigen::Index rows, const Function& function) {
   }
 }
 
-template <Operation operation, bool kUniformA>
-void Unary(const Instruction& instruction, double* const* slots, Eigen::Index rows) {
-  const Operand<kUniformA> a(slots[instruction.operands[0]]);
-  ForRows(slots[instruction.result], rows,
-          [&](Eigen::Index row) { return LaneFunction<operation>::Apply(a.At(row)); });
-}
-
-template <Operation operation, bool kUniformA, bool kUniformB>
-void Binary(const Instruction& instruction, double* const* slots, Eigen::Index rows) {
-  const Operand<kUniformA> a(slots[instruction.operands[0]]);
-  const Operand<kUniformB> b(slots[instruction.operands[1]]);
-  ForRows(slots[instruction.result], rows,
-          [&](Eigen::Index row) { return LaneFunction<operation>::Apply(a.At(row), b.At(row)); });
-}
-
-template <Operation operation, bool kUniformA, bool kUniformB, bool kUniformC>
-void Ternary(const Instruction& instruction, double* const* slots, Eigen::Index rows) {
-  const Operand<kUniformA> a(slots[instruction.operands[0]]);
-  const Operand<kUniformB> b(slots[instruction.operands[1]]);
-  const Operand<kUniformC> c(slots[instruction.operands[2]]);
-  ForRows(slots[instruction.result], rows, [&](Eigen::Index row) {
-    return LaneFunction<operation>::Apply(a.At(row), b.At(row), c.At(row));
+template <Operation operation>
+void Single(const Instruction& instruction, double* const* slots, Eigen::Index rows) {
+  const Operand a(instruction, 0, slots), b(instruction, 1, slots), c(instruction, 2, slots);
+  ForRows(slots[instruction.result], rows, [&](Eigen::Index row) -> Lane {
+    using Function = LaneFunction<operation>;
+    if constexpr (Operands(operation) == 1) {
+      return Function::Apply(a.At(row));
+    } else if constexpr (Operands(operation) == 2) {
+      return Function::Apply(a.At(row), b.At(row));
+    } else {
+      return Function::Apply(a.At(row), b.At(row), c.At(row));
+    }
   });
 }
 
-template <bool kUniform>
-void Copy(const Instruction& instruction, double* const* slots, Eigen::Index rows) {
-  const Operand<kUniform> a(slots[instruction.operands[0]]);
-  ForRows(slots[instruction.result], rows, [&](Eigen::Index row) -> Lane { return a.At(row); });
+// Applies a function to operands; `inner` stands in the place of one of them.
+template <Operation operation, int kPosition>
+Lane ApplyWith(const Lane& inner, const Lane& x, const Lane& y) {
+  using Function = LaneFunction<operation>;
+  if constexpr (Operands(operation) == 2) {
+    return kPosition == 0 ? Function::Apply(inner, x) : Function::Apply(x, inner);
+  } else {
+    return kPosition == 0 ? Function::Apply(inner, x, y) : Function::Apply(x, y, inner);
+  }
 }
 
-template <double (Lookup::*kFunction)(double, double) const, bool kUniformA, bool kUniformB>
+template <Operation kInner, Operation operation, int kPosition>
+void Pair(const Instruction& instruction, double* const* slots, Eigen::Index rows) {
+  constexpr int kOfInner = Operands(kInner);
+  const Operand a(instruction, 0, slots), b(instruction, 1, slots), c(instruction, 2, slots),
+      x(instruction, kOfInner, slots), y(instruction, kOfInner + 1, slots);
+  ForRows(slots[instruction.result], rows, [&](Eigen::Index row) -> Lane {
+    if constexpr (kOfInner == 2) {
+      const Lane inner = LaneFunction<kInner>::Apply(a.At(row), b.At(row));
+      return ApplyWith<operation, kPosition>(inner, x.At(row), y.At(row));
+    } else {
+      const Lane inner = LaneFunction<kInner>::Apply(a.At(row), b.At(row), c.At(row));
+      return ApplyWith<operation, kPosition>(inner, x.At(row), y.At(row));
+    }
+  });
+}
+
+void Copy(const Instruction& instruction, double* const* slots, Eigen::Index rows) {
+  const Operand a(instruction, 0, slots);
+  ForRows(slots[instruction.result], rows, [&](Eigen::Index row) { return a.At(row); });
+}
+
+template <double (Lookup::*kFunction)(double, double) const>
 void Look(const Instruction& instruction, double* const* slots, Eigen::Index rows) {
-  const double* x = slots[instruction.operands[0]];
-  const double* y = slots[instruction.operands[1]];
+  const Operand x(instruction, 0, slots), y(instruction, 1, slots);
   double* result = slots[instruction.result];
   for (Eigen::Index row = 0; row < rows; ++row) {
     // The result may overwrite an operand with one value per row, but never one with a single value
     // for all rows.
-    result[row] = (instruction.lookup->*kFunction)(x[kUniformA ? 0 : row], y[kUniformB ? 0 : row]);
+    result[row] = (instruction.lookup->*kFunction)(x.ValueAt(row), y.ValueAt(row));
   }
 }
 
-template <double (Lookup::*kFunction)(double, double) const>
-Kernel SelectLook(bool uniform_a, bool uniform_b) {
-  if (uniform_a) return uniform_b ? Look<kFunction, true, true> : Look<kFunction, true, false>;
-  return uniform_b ? Look<kFunction, false, true> : Look<kFunction, false, false>;
+// Returns the kernel for the position if it is one of those given.
+template <Operation kInner, Operation operation, int... kPositions>
+Kernel PairAt(int position) {
+  Kernel kernel = nullptr;
+  ((kernel = position == kPositions ? Pair<kInner, operation, kPositions> : kernel), ...);
+  return kernel;
 }
 
-template <Operation operation>
-Kernel SelectUnary(bool uniform_a) {
-  return uniform_a ? Unary<operation, true> : Unary<operation, false>;
-}
-
-template <Operation operation>
-Kernel SelectBinary(bool uniform_a, bool uniform_b) {
-  if (uniform_a) {
-    return uniform_b ? Binary<operation, true, true> : Binary<operation, true, false>;
+template <Operation kInner>
+Kernel SelectPairOf(Operation operation, int position) {
+  using enum Operation;
+  if (operation == kMultiply) return PairAt<kInner, kMultiply, 0>(position);
+  // A product and a sum are one operation already.
+  if constexpr (kInner != kMultiply) {
+    if (operation == kAdd) return PairAt<kInner, kAdd, 0>(position);
+    if (operation == kSubtract) return PairAt<kInner, kSubtract, 0, 1>(position);
   }
-  return uniform_b ? Binary<operation, false, true> : Binary<operation, false, false>;
-}
-
-template <Operation operation, bool kUniformA>
-Kernel SelectTernary(bool uniform_b, bool uniform_c) {
-  if (uniform_b) {
-    return uniform_c ? Ternary<operation, kUniformA, true, true>
-                     : Ternary<operation, kUniformA, true, false>;
-  }
-  return uniform_c ? Ternary<operation, kUniformA, false, true>
-                   : Ternary<operation, kUniformA, false, false>;
-}
-
-template <Operation operation>
-Kernel SelectTernary(bool uniform_a, bool uniform_b, bool uniform_c) {
-  return uniform_a ? SelectTernary<operation, true>(uniform_b, uniform_c)
-                   : SelectTernary<operation, false>(uniform_b, uniform_c);
+  if (operation == kMultiplyAdd) return PairAt<kInner, kMultiplyAdd, 0, 2>(position);
+  if (operation == kMultiplySubtract) return PairAt<kInner, kMultiplySubtract, 0, 2>(position);
+  if (operation == kSubtractMultiplied) return PairAt<kInner, kSubtractMultiplied, 0, 2>(position);
+  return nullptr;
 }
 
 }  // namespace
 
-Kernel SelectKernel(Operation operation, bool uniform_a, bool uniform_b, bool uniform_c) {
+Kernel SelectKernel(Operation operation) {
   switch (operation) {
-#define POLYEST_UNARY(name) \
-  case Operation::name:     \
-    return SelectUnary<Operation::name>(uniform_a);
-#define POLYEST_BINARY(name) \
+#define POLYEST_SINGLE(name) \
   case Operation::name:      \
-    return SelectBinary<Operation::name>(uniform_a, uniform_b);
-#define POLYEST_TERNARY(name) \
-  case Operation::name:       \
-    return SelectTernary<Operation::name>(uniform_a, uniform_b, uniform_c);
-    POLYEST_UNARY(kNegate)
-    POLYEST_UNARY(kNot)
-    POLYEST_UNARY(kAbsolute)
-    POLYEST_UNARY(kSign)
-    POLYEST_UNARY(kSquareRoot)
-    POLYEST_UNARY(kExponential)
-    POLYEST_UNARY(kLogarithm)
-    POLYEST_UNARY(kLogarithm10)
-    POLYEST_UNARY(kSine)
-    POLYEST_UNARY(kCosine)
-    POLYEST_UNARY(kTangent)
-    POLYEST_UNARY(kArcSine)
-    POLYEST_UNARY(kArcCosine)
-    POLYEST_UNARY(kArcTangent)
-    POLYEST_UNARY(kHyperbolicSine)
-    POLYEST_UNARY(kHyperbolicCosine)
-    POLYEST_UNARY(kHyperbolicTangent)
-    POLYEST_UNARY(kFloor)
-    POLYEST_UNARY(kCeiling)
-    POLYEST_BINARY(kAdd)
-    POLYEST_BINARY(kSubtract)
-    POLYEST_BINARY(kMultiply)
-    POLYEST_BINARY(kDivide)
-    POLYEST_BINARY(kPower)
-    POLYEST_BINARY(kMinimum)
-    POLYEST_BINARY(kMaximum)
-    POLYEST_BINARY(kArcTangent2)
-    POLYEST_BINARY(kHypotenuse)
-    POLYEST_BINARY(kModulo)
-    POLYEST_BINARY(kLess)
-    POLYEST_BINARY(kLessOrEqual)
-    POLYEST_BINARY(kEqual)
-    POLYEST_BINARY(kNotEqual)
-    POLYEST_BINARY(kAnd)
-    POLYEST_BINARY(kOr)
-    POLYEST_TERNARY(kSelect)
-    POLYEST_TERNARY(kMultiplyAdd)
-    POLYEST_TERNARY(kMultiplySubtract)
-    POLYEST_TERNARY(kSubtractMultiplied)
-#undef POLYEST_UNARY
-#undef POLYEST_BINARY
-#undef POLYEST_TERNARY
+    return Single<Operation::name>;
+    POLYEST_SINGLE(kNegate)
+    POLYEST_SINGLE(kNot)
+    POLYEST_SINGLE(kAbsolute)
+    POLYEST_SINGLE(kSign)
+    POLYEST_SINGLE(kSquareRoot)
+    POLYEST_SINGLE(kExponential)
+    POLYEST_SINGLE(kLogarithm)
+    POLYEST_SINGLE(kLogarithm10)
+    POLYEST_SINGLE(kSine)
+    POLYEST_SINGLE(kCosine)
+    POLYEST_SINGLE(kTangent)
+    POLYEST_SINGLE(kArcSine)
+    POLYEST_SINGLE(kArcCosine)
+    POLYEST_SINGLE(kArcTangent)
+    POLYEST_SINGLE(kHyperbolicSine)
+    POLYEST_SINGLE(kHyperbolicCosine)
+    POLYEST_SINGLE(kHyperbolicTangent)
+    POLYEST_SINGLE(kFloor)
+    POLYEST_SINGLE(kCeiling)
+    POLYEST_SINGLE(kAdd)
+    POLYEST_SINGLE(kSubtract)
+    POLYEST_SINGLE(kMultiply)
+    POLYEST_SINGLE(kDivide)
+    POLYEST_SINGLE(kPower)
+    POLYEST_SINGLE(kMinimum)
+    POLYEST_SINGLE(kMaximum)
+    POLYEST_SINGLE(kArcTangent2)
+    POLYEST_SINGLE(kHypotenuse)
+    POLYEST_SINGLE(kModulo)
+    POLYEST_SINGLE(kLess)
+    POLYEST_SINGLE(kLessOrEqual)
+    POLYEST_SINGLE(kEqual)
+    POLYEST_SINGLE(kNotEqual)
+    POLYEST_SINGLE(kAnd)
+    POLYEST_SINGLE(kOr)
+    POLYEST_SINGLE(kSelect)
+    POLYEST_SINGLE(kMultiplyAdd)
+    POLYEST_SINGLE(kMultiplySubtract)
+    POLYEST_SINGLE(kSubtractMultiplied)
+#undef POLYEST_SINGLE
     case Operation::kLookup:
-      return SelectLook<&Lookup::Value>(uniform_a, uniform_b);
+      return Look<&Lookup::Value>;
     case Operation::kLookupSlopeX:
-      return SelectLook<&Lookup::SlopeX>(uniform_a, uniform_b);
+      return Look<&Lookup::SlopeX>;
     case Operation::kLookupSlopeY:
-      return SelectLook<&Lookup::SlopeY>(uniform_a, uniform_b);
+      return Look<&Lookup::SlopeY>;
     case Operation::kConstant:
     case Operation::kVariable:
       break;
@@ -182,15 +170,38 @@ Kernel SelectKernel(Operation operation, bool uniform_a, bool uniform_b, bool un
   return nullptr;
 }
 
-Kernel CopyKernel(bool uniform) { return uniform ? Copy<true> : Copy<false>; }
+Kernel SelectPair(Operation inner, Operation operation, int position) {
+  switch (inner) {
+    case Operation::kAdd:
+      return SelectPairOf<Operation::kAdd>(operation, position);
+    case Operation::kSubtract:
+      return SelectPairOf<Operation::kSubtract>(operation, position);
+    case Operation::kMultiply:
+      return SelectPairOf<Operation::kMultiply>(operation, position);
+    case Operation::kMultiplyAdd:
+      return SelectPairOf<Operation::kMultiplyAdd>(operation, position);
+    case Operation::kMultiplySubtract:
+      return SelectPairOf<Operation::kMultiplySubtract>(operation, position);
+    case Operation::kSubtractMultiplied:
+      return SelectPairOf<Operation::kSubtractMultiplied>(operation, position);
+    default:
+      return nullptr;
+  }
+}
+
+Kernel CopyKernel() { return Copy; }
 
 double EvaluateAtPoint(Operation operation, double a, double b, double c) {
   POLYEST_CHECK(!IsLookup(operation));
-  double values[3] = {a, b, c};
-  alignas(64) double result[kLanes];
-  double* const slots[] = {&values[0], &values[1], &values[2], result};
-  const Kernel kernel = SelectKernel(operation, true, true, true);
-  kernel({.kernel = kernel, .result = 3, .operands = {0, 1, 2}, .lookup = nullptr}, slots, kLanes);
+  Lane values[3] = {Lane::Constant(a), Lane::Constant(b), Lane::Constant(c)};
+  Lane result;
+  double* const slots[] = {values[0].data(), values[1].data(), values[2].data(), result.data()};
+  const Instruction instruction{.kernel = SelectKernel(operation),
+                                .result = 3,
+                                .operands = {0, 1, 2},
+                                .masks = {},
+                                .lookup = nullptr};
+  instruction.kernel(instruction, slots, kLanes);
   return result[0];
 }
 

@@ -13,22 +13,33 @@ namespace polyest::internal::equations {
 struct Instruction;
 
 // Carries out the instruction on `rows` rows, a multiple of kLanes. slots[i] points to the values
-// of slot i.
+// of slot i: one for each row or, where they are the same for all rows, kLanes of them.
 using Kernel = void (*)(const Instruction& instruction, double* const* slots, Eigen::Index rows);
 
 struct Instruction {
+  static constexpr int kMostOperands = 5;
+
   Kernel kernel;
   std::uint32_t result;
-  std::uint32_t operands[3];  // slots; one of them may be the result's
-  const Lookup* lookup;       // the table, for a lookup
+  std::uint32_t operands[kMostOperands];  // slots; one of them may be the result's
+  // Of each operand's slot: ~0, or 0 where its values are the same for all rows. The values of a
+  // row begin at (row & mask).
+  std::int32_t masks[kMostOperands];
+  const Lookup* lookup;  // the table, for a lookup
 };
 
-// Returns the kernel for the operation. `uniform_x` says whether the slot of operand x holds a
-// single value for all rows.
-Kernel SelectKernel(Operation operation, bool uniform_a, bool uniform_b, bool uniform_c);
+// Returns the kernel for the operation.
+Kernel SelectKernel(Operation operation);
+
+// Returns the kernel for an operation one of whose operands, that at `position`, is the result of
+// another, `inner`; the instruction's operands are those of `inner` and then the others. Its values
+// are those of the two operations one after the other, bit for bit. Returns nullptr if there is
+// none: they exist for sums, differences and products, at the first of two positions that are
+// equivalent.
+Kernel SelectPair(Operation inner, Operation operation, int position);
 
 // Returns the kernel that copies its operand.
-Kernel CopyKernel(bool uniform);
+Kernel CopyKernel();
 
 // Returns the operation's value at one point, bit for bit the value that the kernels give.
 double EvaluateAtPoint(Operation operation, double a, double b, double c);

@@ -74,6 +74,18 @@ inline Lane Modulo(const Lane& a, const Lane& b) {
   return result;
 }
 
+// Returns a b + c, rounded once where the processor has an instruction for that. It is not left to
+// the compiler, which would choose one of several products.
+inline Lane MultiplyAdd(const Lane& a, const Lane& b, const Lane& c) {
+#ifdef __FMA__
+  Lane result;
+  for (int i = 0; i < kLanes; ++i) result[i] = std::fma(a[i], b[i], c[i]);
+  return result;
+#else
+  return a * b + c;
+#endif
+}
+
 POLYEST_UNARY(kNegate, -a)
 POLYEST_UNARY(kNot, Truth(a, Lane::Zero(), std::equal_to<>()))
 POLYEST_UNARY(kAbsolute, a.abs())
@@ -112,9 +124,9 @@ POLYEST_BINARY(kAnd, Truth(a, b, [](double p, double q) { return p != 0 && q != 
 POLYEST_BINARY(kOr, Truth(a, b, [](double p, double q) { return p != 0 || q != 0; }))
 
 POLYEST_TERNARY(kSelect, Select(a, b, c))
-POLYEST_TERNARY(kMultiplyAdd, a* b + c)
-POLYEST_TERNARY(kMultiplySubtract, a* b - c)
-POLYEST_TERNARY(kSubtractMultiplied, c - a * b)
+POLYEST_TERNARY(kMultiplyAdd, MultiplyAdd(a, b, c))
+POLYEST_TERNARY(kMultiplySubtract, MultiplyAdd(a, b, -c))
+POLYEST_TERNARY(kSubtractMultiplied, MultiplyAdd(-a, b, c))
 
 #undef POLYEST_UNARY
 #undef POLYEST_BINARY

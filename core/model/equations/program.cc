@@ -77,10 +77,12 @@ void Program::Run(double time_s, std::span<const ConstBlock* const> blocks, Bloc
   Scratch& scratch = ThreadScratch(first_register_ + static_cast<size_t>(registers_),
                                    values_of_time + registers_ * kRows);
   double** const slots = scratch.slots.data();
-  slots[0] = &time_s;
+  Lane time = Lane::Constant(time_s);
+  slots[0] = time.data();
   // Kernels only read the slots of operands, so the cast is safe: see Kernel.
-  double* const constants = const_cast<double*>(constants_.data());
-  for (size_t i = 0; i < constants_.size(); ++i) slots[1 + i] = constants + i;
+  for (size_t i = 0; i < constants_.size(); ++i) {
+    slots[1 + i] = const_cast<double*>(constants_[i].data());
+  }
   double* const registers = scratch.registers.data();
   for (size_t i = 0; i < of_time_.size(); ++i) {
     slots[of_time_[i].result] = registers + static_cast<Eigen::Index>(i) * kLanes;

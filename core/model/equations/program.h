@@ -8,7 +8,9 @@
 // those of the program's last run in this thread; a quotient whose divisor is one of them becomes a
 // product with its reciprocal. An intermediate value occupies a register of kRows rows for as long
 // as it is needed. A product that is only added or subtracted once is fused with that sum into one
-// instruction. The first run in a thread may allocate memory; later runs do not.
+// operation; and an operation takes another into its instruction that only it reads, since what
+// an instruction stores and loads takes longer than what it computes. The first run in a thread may
+// allocate memory; later runs do not.
 
 #include <cstdint>
 #include <span>
@@ -17,6 +19,7 @@
 #include "core/common/types.h"
 #include "core/model/equations/graph.h"
 #include "core/model/equations/kernels.h"
+#include "core/model/lane.h"
 
 namespace polyest::internal::equations {
 
@@ -69,7 +72,7 @@ class Program {
   std::vector<Instruction> of_parameters_;
   std::vector<Instruction> instructions_;
   std::vector<Load> loads_;
-  std::vector<double> constants_;
+  std::vector<Lane> constants_;
   std::vector<Eigen::Index> zero_;  // columns of the results that are always 0
   std::int64_t id_ = 0;             // which only copies of a program share
   int parameters_ = kNone;

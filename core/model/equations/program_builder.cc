@@ -2,31 +2,16 @@
 
 #include <algorithm>
 #include <atomic>
-#include <limits>
-#include <map>
 
 #include "core/common/check.h"
 #include "core/model/equations/program.h"
+#include "core/model/equations/steps.h"
 
 namespace polyest::internal::equations {
 namespace {
 
-constexpr std::uint32_t kNowhere = std::numeric_limits<std::uint32_t>::max();
 // Most values of parameters alone that are kept; each takes 512 bytes per thread.
 constexpr std::uint32_t kMaxKept = 512;
-
-// A node as it is computed: a product may be fused with a sum where that saves an instruction.
-struct Step {
-  Operation operation;
-  NodeId operands[3];
-  int uses = 0;       // number of steps and roots that read it
-  int last_use = -1;  // position of the last instruction that reads it
-  bool needed = false;
-  bool of_time = false;        // whether all that it depends on is the time
-  bool of_parameters = false;  // whether it depends on parameters, and on nothing else
-  bool kept = false;           // of parameters, and read by what is not, or a root
-  std::uint32_t slot = kNowhere;
-};
 
 }  // namespace
 
@@ -35,15 +20,16 @@ class ProgramBuilder {
   ProgramBuilder(const Graph& graph, const std::vector<NodeId>& roots,
                  const std::vector<VariablePlace>& places, const std::vector<Lookup>& tables,
                  int parameters)
-      : graph_(graph), roots_(roots), places_(places), tables_(tables), parameters_(parameters) {}
+      : graph_(graph),
+        roots_(roots),
+        places_(places),
+        tables_(tables),
+        parameters_(parameters),
+        steps_(MakeSteps(graph, roots, places, parameters)) {}
 
   Program Build() {
     static std::atomic<std::int64_t> count = 0;
     program_.id_ = ++count;
-    CountUses();
-    FindThoseOfParameters();
-    TakeReciprocals();
-    Fuse();
     for (const NodeId root : roots_) Order(root);
     FindThoseOfTime();
     FindWhatIsKept();
@@ -58,12 +44,6 @@ class ProgramBuilder {
   const Step& step(NodeId id) const { return steps_[static_cast<size_t>(id)]; }
   bool IsLeaf(NodeId id) const { return Operands(step(id).operation) == 0; }
 
-  void CountUses();
-  void FindThoseOfParameters();
-  void TakeReciprocals();
-  NodeId ReciprocalOf(NodeId divisor);
-  void Fuse();
-  bool Draw(NodeId sum, Operation operation, NodeId product, NodeId other);
   void Order(NodeId root);
   void FindThoseOfTime();
   void FindWhatIsKept();
@@ -74,8 +54,9 @@ class ProgramBuilder {
   void EmitStep(NodeId id, int position);
   void NoteParameterColumns();
   Instruction InstructionOf(NodeId id) const;
-  bool IsUniform(std::uint32_t slot) const {
-    return slot < 1 + program_.constants_.size() + static_cast<size_t>(of_time_);
+  // Returns the mask of the rows of a slot, see Instruction.
+  std::int32_t MaskOf(std::uint32_t slot) const {
+    return slot < 1 + program_.constants_.size() + static_cast<size_t>(of_time_) ? 0 : ~0;
   }
 
   const Graph& graph_;
@@ -83,104 +64,12 @@ class ProgramBuilder {
   const std::vector<VariablePlace>& places_;
   const std::vector<Lookup>& tables_;
   const int parameters_;
-  std::vector<Step> steps_;  // the nodes of the graph, and reciprocals
-  std::map<NodeId, NodeId> reciprocals_;
+  std::vector<Step> steps_;
   std::vector<NodeId> order_;  // the nodes to compute, operands first
   int of_time_ = 0;            // number of steps of the time alone
   std::vector<std::uint32_t> free_registers_;
   Program program_;
 };
-
-void ProgramBuilder::CountUses() {
-  for (NodeId id = 0; id < graph_.size(); ++id) {
-    const Node& node = graph_.node(id);
-    steps_.push_back({node.operation, {node.operands[0], node.operands[1], node.operands[2]}});
-  }
-  for (const NodeId root : roots_) {
-    step(root).needed = true;
-    ++step(root).uses;
-  }
-  for (NodeId id = graph_.size(); id-- > 0;) {
-    if (!step(id).needed) continue;
-    for (const NodeId operand : step(id).operands) {
-      if (operand < 0) continue;
-      step(operand).needed = true;
-      ++step(operand).uses;
-    }
-  }
-}
-
-void ProgramBuilder::FindThoseOfParameters() {
-  for (NodeId id = 0; id < graph_.size(); ++id) {
-    const Node& node = graph_.node(id);
-    if (node.operation == Operation::kVariable) {
-      step(id).of_parameters = places_[static_cast<size_t>(node.index)].block == parameters_;
-      continue;
-    }
-    bool any = false, others = false;
-    for (const NodeId operand : node.operands) {
-      if (operand < 0) continue;
-      any = any || step(operand).of_parameters;
-      others = others || !(step(operand).of_parameters || graph_.IsConstant(operand));
-    }
-    step(id).of_parameters = any && !others;
-  }
-}
-
-// Makes x/p, where only p is of the parameters alone, x (1/p).
-void ProgramBuilder::TakeReciprocals() {
-  for (NodeId id = 0; id < graph_.size(); ++id) {
-    const auto [x, p, none] = step(id).operands;
-    if (!step(id).needed || step(id).operation != Operation::kDivide || step(id).of_parameters ||
-        !step(p).of_parameters) {
-      continue;
-    }
-    const NodeId reciprocal = ReciprocalOf(p);
-    --step(p).uses;
-    ++step(reciprocal).uses;
-    step(id).operation = Operation::kMultiply;
-    step(id).operands[1] = reciprocal;
-  }
-}
-
-NodeId ProgramBuilder::ReciprocalOf(NodeId divisor) {
-  const auto [found, is_new] =
-      reciprocals_.try_emplace(divisor, static_cast<NodeId>(steps_.size()));
-  if (is_new) {
-    steps_.push_back({Operation::kDivide, {Graph::kOne, divisor, -1}});
-    steps_.back().needed = steps_.back().of_parameters = true;
-    ++step(divisor).uses;
-    ++step(Graph::kOne).uses;
-  }
-  return found->second;
-}
-
-void ProgramBuilder::Fuse() {
-  for (NodeId id = 0; id < graph_.size(); ++id) {
-    if (!step(id).needed) continue;
-    const auto [a, b, c] = step(id).operands;
-    if (step(id).operation == Operation::kAdd) {
-      Draw(id, Operation::kMultiplyAdd, a, b) || Draw(id, Operation::kMultiplyAdd, b, a);
-    } else if (step(id).operation == Operation::kSubtract) {
-      Draw(id, Operation::kSubtractMultiplied, b, a) ||
-          Draw(id, Operation::kMultiplySubtract, a, b);
-    }
-  }
-}
-
-// Fuses `product` into `sum`: makes `sum` the operation on the factors of `product` and the other
-// term. Returns false if `product` is not a product, has other uses or need not be computed each
-// time.
-bool ProgramBuilder::Draw(NodeId sum, Operation operation, NodeId product, NodeId other) {
-  if (step(product).operation != Operation::kMultiply || step(product).uses != 1) return false;
-  if (step(product).of_parameters && !step(sum).of_parameters) return false;
-  const auto [a, b, none] = step(product).operands;
-  step(sum).operation = operation;
-  step(sum).operands[0] = a;
-  step(sum).operands[1] = b;
-  step(sum).operands[2] = other;
-  return true;
-}
 
 // Appends the nodes that `root` depends on and that are not yet in the order, operands first,
 // without recursion.
@@ -192,8 +81,7 @@ void ProgramBuilder::Order(NodeId root) {
       path.pop_back();
       continue;
     }
-    while (next < 3 && step(id).operands[next] < 0) ++next;
-    if (next < 3) {
+    if (next < Instruction::kMostOperands && step(id).operands[next] >= 0) {
       path.emplace_back(step(id).operands[next++], 0);
       continue;
     }
@@ -242,14 +130,13 @@ void ProgramBuilder::FindWhatIsKept() {
 }
 
 void ProgramBuilder::PlaceLeaf(NodeId id) {
-  const Node& node = graph_.node(id);
   if (step(id).slot != kNowhere) return;
-  if (node.operation == Operation::kConstant) {
-    program_.constants_.push_back(node.value);
+  if (graph_.IsConstant(id)) {
+    program_.constants_.push_back(Lane::Constant(graph_.node(id).value));
     step(id).slot = static_cast<std::uint32_t>(program_.constants_.size());
     return;
   }
-  const VariablePlace& place = places_[static_cast<size_t>(node.index)];
+  const VariablePlace& place = places_[static_cast<size_t>(graph_.node(id).index)];
   if (place.block == VariablePlace::kTime) {
     step(id).slot = 0;
     return;
@@ -312,15 +199,17 @@ void ProgramBuilder::PlaceResults() {
 Instruction ProgramBuilder::InstructionOf(NodeId id) const {
   const Step& current = step(id);
   Instruction instruction{};
-  bool uniform[3] = {true, true, true};
-  for (int i = 0; i < 3; ++i) {
+  for (int i = 0; i < Instruction::kMostOperands; ++i) {
     // A missing operand is replaced by the first one.
     const NodeId operand = current.operands[current.operands[i] < 0 ? 0 : i];
     instruction.operands[i] = step(operand).slot;
-    uniform[i] = IsUniform(step(operand).slot);
+    instruction.masks[i] = MaskOf(step(operand).slot);
   }
   instruction.result = current.slot;
-  instruction.kernel = SelectKernel(current.operation, uniform[0], uniform[1], uniform[2]);
+  instruction.kernel =
+      current.inner.has_value()
+          ? SelectPair(current.inner->operation, current.operation, current.inner->position)
+          : SelectKernel(current.operation);
   if (IsLookup(current.operation)) {
     instruction.lookup = &tables_[static_cast<size_t>(graph_.node(id).index)];
   }
@@ -371,7 +260,7 @@ void ProgramBuilder::Emit() {
       program_.zero_.push_back(static_cast<Eigen::Index>(i));
     } else if (const std::uint32_t slot = step(roots_[i]).slot; slot != column) {
       program_.instructions_.push_back(
-          {CopyKernel(IsUniform(slot)), column, {slot, slot, slot}, nullptr});
+          {CopyKernel(), column, {slot, slot, slot, slot, slot}, {MaskOf(slot)}, nullptr});
     }
   }
 }
