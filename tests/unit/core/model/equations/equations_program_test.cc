@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <random>
 
 #include "core/model/equations/definitions.h"
 #include "core/model/equations/differentiate.h"
@@ -78,7 +79,7 @@ TEST(EquationProgram, DrawsAProductIntoTheSum) {
   EXPECT_EQ(Shared({"a*b + c", "a*b"}).Instructions(), 2);
 }
 
-// Compiles expressions of the states x, y and the parameters p, q.
+// Compiles expressions of the states x, y, the parameters p, q and the time t.
 Program OfParameters(const std::vector<std::string>& texts, bool keeps = true) {
   Graph graph(1000);
   std::map<std::string, NodeId> names;
@@ -87,6 +88,8 @@ Program OfParameters(const std::vector<std::string>& texts, bool keeps = true) {
     names[name] = graph.Variable(static_cast<int>(places.size()));
     places.push_back({places.size() < 2 ? 0 : 1, std::ssize(places) % 2});
   }
+  names["t"] = graph.Variable(static_cast<int>(places.size()));
+  places.push_back({VariablePlace::kTime, 0});
   std::vector<NodeId> roots;
   for (const std::string& text : texts) {
     roots.push_back(*Lower(*Parse("text", text, {}), names, {}, graph));
@@ -200,12 +203,73 @@ TEST(EquationProgram, SeparatesWhatDependsOnTheParametersAlone) {
 }
 
 Eigen::ArrayXXd Evaluate(const Program& program, const Eigen::ArrayXXd& states,
-                         const Eigen::ArrayXXd& parameters) {
+                         const Eigen::ArrayXXd& parameters, double time_s = 0) {
   Eigen::ArrayXXd results(states.rows(), program.results());
   const ConstBlock of_states(states), of_parameters(parameters);
   const std::array<const ConstBlock*, 2> blocks = {&of_states, &of_parameters};
-  program.Run(0, blocks, results);
+  program.Run(time_s, blocks, results);
   return results;
+}
+
+// A sum, difference or product of others, and its value in each row.
+struct Expression {
+  std::string text;
+  Eigen::ArrayXd values;
+};
+
+// Returns expressions of those given, `count` on top of these; others may read each of them again.
+std::vector<Expression> Combined(std::vector<Expression> expressions, int count,
+                                 std::mt19937& random) {
+  for (int i = 0; i < count; ++i) {
+    const Expression& left = expressions[random() % expressions.size()];
+    const Expression& right = expressions[random() % expressions.size()];
+    const unsigned operation = random() % 3;
+    // Products of large numbers would have to be rounded.
+    const bool large = (left.values.abs().maxCoeff() * right.values.abs().maxCoeff()) > 1e12;
+    const auto text = [&](const char* symbol) {
+      return absl::StrCat("(", left.text, symbol, right.text, ")");
+    };
+    if (operation == 0 && !large) {
+      expressions.push_back({text("*"), left.values * right.values});
+    } else if (operation == 1) {
+      expressions.push_back({text(" - "), left.values - right.values});
+    } else {
+      expressions.push_back({text(" + "), left.values + right.values});
+    }
+  }
+  return expressions;
+}
+
+// The oracle is arithmetic of integers, which is exact.
+TEST(EquationProgram, ComputesExpressionsOfIntegersExactly) {
+  std::mt19937 random(1);
+  constexpr Eigen::Index kMany = Program::kRows + kLanes;
+  for (int i = 0; i < 300; ++i) {
+    const auto integers = [&] {
+      return Eigen::ArrayXXd(Eigen::ArrayXXd::NullaryExpr(
+          kMany, 2, [&] { return static_cast<double>(random() % 7) - 3; }));
+    };
+    const Eigen::ArrayXXd states = integers(), parameters = integers();
+    const double time_s = i % 5;
+    std::vector<Expression> leaves = {{"x", states.col(0)},
+                                      {"y", states.col(1)},
+                                      {"p", parameters.col(0)},
+                                      {"q", parameters.col(1)},
+                                      {"t", Eigen::ArrayXd::Constant(kMany, time_s)},
+                                      {"3", Eigen::ArrayXd::Constant(kMany, 3)}};
+    const std::vector<Expression> all = Combined(leaves, 1 + i % 9, random);
+    std::vector<std::string> texts;
+    for (size_t one = leaves.size(); one < all.size(); ++one) texts.push_back(all[one].text);
+    const std::vector<std::string> last = {texts.back()};
+    for (const auto& asked : {texts, last}) {
+      const Eigen::ArrayXXd results = Evaluate(OfParameters(asked), states, parameters, time_s);
+      for (size_t one = 0; one < asked.size(); ++one) {
+        const Expression& expected = all[all.size() - asked.size() + one];
+        EXPECT_TRUE((results.col(static_cast<Eigen::Index>(one)) == expected.values).all())
+            << expected.text;
+      }
+    }
+  }
 }
 
 // The oracles are a program that has kept nothing yet, for the bits, and one that keeps nothing.
