@@ -50,20 +50,6 @@ void AddIdentifiability(const Findings& findings, const Estimate& estimate,
         100 * trade_off.second_alone);
   }
   diagnostics.push_back({DiagnosticCode::kNotIdentified, std::move(message)});
-  for (int i = 0; i < findings.problem->dimension(); ++i) {
-    const ParameterEstimate& parameter = estimate.parameters[static_cast<size_t>(i)];
-    if (parameter.verdict != Verdict::kNotIdentified) continue;
-    const SamplingInformation information =
-        InformationBetweenSamples(*findings.problem, findings.expansion->noise(),
-                                  findings.record->beginning(), findings.map_xi, i);
-    if (!information.undersampled) continue;
-    diagnostics.push_back(
-        {DiagnosticCode::kUndersampled,
-         absl::StrFormat("the samples miss what %s changes: as many samples between them would "
-                         "know it %.0f times better than the prior (in variance); sample at other "
-                         "times, or more often",
-                         parameter.name, information.between)});
-  }
 }
 
 // Returns < 0 if the estimate lies on the lower bound of parameter i, > 0 on the upper one, else 0.
@@ -377,6 +363,7 @@ const std::string& Findings::NameOf(int parameter) const {
 std::vector<Diagnostic> Diagnose(const Findings& findings, const Estimate& estimate) {
   std::vector<Diagnostic> diagnostics;
   AddIdentifiability(findings, estimate, diagnostics);
+  AddUndersampling(findings, estimate, diagnostics);
   AddInaccuracy(findings, estimate, diagnostics);
   AddIntegrationError(findings, diagnostics);
   AddPopulation(findings, diagnostics);

@@ -1,7 +1,10 @@
 #include "core/estimator/posterior/undersampling.h"
 
+#include <absl/strings/str_format.h>
+
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "core/bayes/identifiability.h"
 
@@ -9,6 +12,16 @@ namespace polyest::internal {
 namespace {
 
 constexpr int kPhases = 8;  // number of equal parts of an interval between samples
+// Fewest rows and turning points from which a response is judged.
+constexpr int kFewestRows = 8;
+constexpr int kFewestTurns = 4;
+// A turning point counts if the response swings by more than this many standard deviations of the
+// noise before and after it.
+constexpr double kSwing = 4;
+// Root mean square of how far samples may be from even spacing, in intervals.
+constexpr double kUneven = 0.05;
+// By how many prior standard deviations parameters are moved to find other responses.
+constexpr double kMoved = 2;
 
 struct Times {
   std::vector<double> time_s;  // every phase of every interval; the first begins at t = 0
@@ -30,47 +43,77 @@ Times FineTimes(const RowBlock& beginning) {
   return times;
 }
 
-}  // namespace
+struct SamplingInformation {
+  double at_samples = 0;
+  double between = 0;  // the largest over several phases of the intervals, the samples included
+  bool undersampled = false;
+};
 
-SamplingInformation InformationBetweenSamples(const ResolvedProblem& problem,
-                                              const LearnedNoise& noise, const RowBlock& beginning,
-                                              const Vector& map_xi, int parameter) {
-  SamplingInformation information;
-  if (beginning.count() == 0 || !problem.streamed_inputs().empty()) return information;
-  const Prior& prior = problem.prior();
-  // Scores are used because with them this parameter can move alone.
-  const Vector map_z = prior.ToScores(map_xi);
-  const double deviation = prior.GermStandardDeviation()[parameter];
-  const double low = std::max(prior.lower()[parameter], map_z[parameter] - 0.5 * deviation);
-  const double high = std::min(prior.upper()[parameter], map_z[parameter] + 0.5 * deviation);
-  const double distance = (high - low) / deviation;
-  Matrix thetas = prior.ToParameters(map_xi).transpose().replicate(2, 1);
-  thetas(0, parameter) = prior.OfScore(parameter, low);
-  thetas(1, parameter) = prior.OfScore(parameter, high);
-
+// Returns the outputs at the times (channels by turns) of the model at parameters, one row each;
+// nothing if it cannot be run there.
+std::optional<Matrix> RunAt(const ResolvedProblem& problem, const Matrix& thetas,
+                            const std::vector<double>& times_s) {
   const InputSignals inputs = problem.MakeInputs();
   EnsemblePropagator propagator(problem.MakeEnsemble(thetas, problem.outputs(), 1), &inputs);
-  const Times times = FineTimes(beginning);
-  const int m = problem.channels();
-  Matrix outputs(2, m * static_cast<Eigen::Index>(times.time_s.size()));
-  if (!propagator.Advance(times.time_s, outputs, Stop()).ok() || !outputs.allFinite()) {
-    return information;
+  Matrix outputs(thetas.rows(), problem.channels() * std::ssize(times_s));
+  if (!propagator.Advance(times_s, outputs, Stop()).ok() || !outputs.allFinite()) {
+    return std::nullopt;
   }
+  return outputs;
+}
+
+// Returns scores in which parameter i is moved from the estimate by a number of prior standard
+// deviations, at most to the bounds of Ω. Scores are used because with them a parameter can move
+// alone.
+double MovedScore(const Prior& prior, const Vector& map_z, int i, double deviations) {
+  return std::clamp(map_z[i] + deviations * prior.GermStandardDeviation()[i], prior.lower()[i],
+                    prior.upper()[i]);
+}
+
+// Returns the parameters of the estimate, with one of them moved so.
+Vector Moved(const Prior& prior, const Vector& map_xi, int i, double deviations) {
+  Vector theta = prior.ToParameters(map_xi);
+  theta[i] = prior.OfScore(i, MovedScore(prior, prior.ToScores(map_xi), i, deviations));
+  return theta;
+}
+
+// Returns the standard deviation of the noise of a channel about an output.
+double Deviation(const Findings& findings, int channel, double output, double largest) {
+  const NoiseModel& noise =
+      findings.problem->problem().measured[static_cast<size_t>(channel)].noise;
+  return findings.expansion->noise().channels[static_cast<size_t>(channel)].scale *
+         noise.StandardDeviation(output, largest);
+}
+
+// Returns the information about a parameter, from runs of the model with it moved by half a prior
+// standard deviation to each side; zeros if the model cannot be run.
+SamplingInformation InformationBetweenSamples(const Findings& findings, int parameter) {
+  SamplingInformation information;
+  const RowBlock& beginning = findings.record->beginning();
+  const Prior& prior = findings.problem->prior();
+  const Vector map_z = prior.ToScores(findings.map_xi);
+  const double distance =
+      (MovedScore(prior, map_z, parameter, 0.5) - MovedScore(prior, map_z, parameter, -0.5)) /
+      prior.GermStandardDeviation()[parameter];
+  Matrix thetas(2, prior.dimension());
+  thetas << Moved(prior, findings.map_xi, parameter, -0.5).transpose(),
+      Moved(prior, findings.map_xi, parameter, 0.5).transpose();
+  const Times times = FineTimes(beginning);
+  const int m = findings.problem->channels();
+  const std::optional<Matrix> outputs = RunAt(*findings.problem, thetas, times.time_s);
+  if (!outputs) return information;
   Vector by_phase = Vector::Zero(kPhases);
   Vector largest = Vector::Zero(m);
-  for (Eigen::Index column = 0; column < outputs.cols(); ++column) {
-    largest[column % m] = std::max(largest[column % m], outputs.col(column).cwiseAbs().maxCoeff());
+  for (Eigen::Index column = 0; column < outputs->cols(); ++column) {
+    largest[column % m] = std::max(largest[column % m], outputs->col(column).cwiseAbs().maxCoeff());
   }
   for (size_t i = 0; i < times.time_s.size(); ++i) {
     for (int c = 0; c < m; ++c) {
       if (beginning.noise[static_cast<size_t>(times.row[i] * m + c)] <= 0) continue;  // no sample
       const auto column = static_cast<Eigen::Index>(i) * m + c;
-      const double sigma =
-          noise.channels[static_cast<size_t>(c)].scale *
-          problem.problem().measured[static_cast<size_t>(c)].noise.StandardDeviation(
-              outputs.col(column).mean(), largest[c]);
+      const double sigma = Deviation(findings, c, outputs->col(column).mean(), largest[c]);
       if (sigma <= 0) continue;  // an output that is always 0 has no relative noise
-      const double slope = (outputs(1, column) - outputs(0, column)) / distance / sigma;
+      const double slope = ((*outputs)(1, column) - (*outputs)(0, column)) / distance / sigma;
       by_phase[static_cast<Eigen::Index>(i) % kPhases] += slope * slope;
     }
   }
@@ -79,6 +122,147 @@ SamplingInformation InformationBetweenSamples(const ResolvedProblem& problem,
   information.undersampled =
       information.at_samples < kWeakInformation && information.between > kIdentifiedInformation;
   return information;
+}
+
+// Returns the numbers of the rows in which a channel has a sample.
+std::vector<int> RowsOf(const RowBlock& beginning, int channels, int channel) {
+  std::vector<int> rows;
+  for (int k = 0; k < beginning.count(); ++k) {
+    if (beginning.noise[static_cast<size_t>(k * channels + channel)] > 0) rows.push_back(k);
+  }
+  return rows;
+}
+
+// Whether the samples in these rows are so evenly spaced that those of responses that differ by the
+// sampling rate are alike.
+bool AreEven(const RowBlock& beginning, const std::vector<int>& rows) {
+  const auto time = [&](int row) { return beginning.rows[static_cast<size_t>(row)].time_s; };
+  const double interval = (time(rows.back()) - time(rows.front())) / (std::ssize(rows) - 1.0);
+  double squares = 0;
+  for (size_t i = 0; i < rows.size(); ++i) {
+    const double late = time(rows[i]) - time(rows.front()) - static_cast<double>(i) * interval;
+    squares += late * late;
+  }
+  return std::sqrt(squares / static_cast<double>(rows.size())) <= kUneven * interval;
+}
+
+// Returns the number of turning points between two samples, the mean up to the last one; 0 where
+// there are too few. `outputs` is a channel at all times of FineTimes, and what it swings by less
+// than `least` does not count.
+double TurnsBetweenSamples(const Vector& outputs, const std::vector<int>& rows, double least) {
+  const auto at = [](int row) { return (row + 1) * kPhases - 1; };
+  double low = outputs[at(rows.front())], high = low;
+  int direction = 0, turns = 0, last = 0;
+  for (int j = at(rows.front()); j <= at(rows.back()); ++j) {
+    low = std::min(low, outputs[j]);
+    high = std::max(high, outputs[j]);
+    const bool rises = direction <= 0 && outputs[j] - low > least;
+    const bool falls = direction >= 0 && high - outputs[j] > least;
+    if (!rises && !falls) continue;
+    if (direction != 0) {
+      ++turns;
+      last = j;
+    }
+    direction = rises ? 1 : -1;
+    low = high = outputs[j];
+  }
+  if (turns < kFewestTurns) return 0;
+  const auto until = std::ranges::count_if(rows, [&](int row) { return at(row) < last; });
+  return static_cast<double>(turns) / static_cast<double>(until);
+}
+
+// A channel whose response turns more than once between two samples.
+struct Aliased {
+  int channel = 0;
+  double turns = 0;
+};
+
+// Returns the channel that turns the least of all that turn, unless it turns once between two
+// samples at most or these are uneven.
+std::optional<Aliased> AliasedChannel(const Findings& findings, const Vector& outputs) {
+  const RowBlock& beginning = findings.record->beginning();
+  const int m = findings.problem->channels();
+  std::optional<Aliased> least;
+  for (int c = 0; c < m; ++c) {
+    const std::vector<int> rows = RowsOf(beginning, m, c);
+    if (std::ssize(rows) < kFewestRows) continue;
+    const Vector channel = outputs(Eigen::seq(c, Eigen::last, m));
+    const double largest = channel.cwiseAbs().maxCoeff();
+    const double turns =
+        TurnsBetweenSamples(channel, rows, kSwing * Deviation(findings, c, largest, largest));
+    if (turns == 0) continue;
+    if (turns <= 1 || !AreEven(beginning, rows)) return std::nullopt;
+    if (!least || turns < least->turns) least = Aliased{c, turns};
+  }
+  return least;
+}
+
+// Whether a channel turns less or more often, by one turn at least, where the parameters are moved
+// within the prior.
+bool PriorAllowsOtherTurns(const Findings& findings, const Times& times, const Aliased& aliased) {
+  const Prior& prior = findings.problem->prior();
+  const int n = prior.dimension(), m = findings.problem->channels();
+  Matrix thetas(2 * n, n);
+  for (int i = 0; i < n; ++i) {
+    thetas.row(2 * i) = Moved(prior, findings.map_xi, i, -kMoved).transpose();
+    thetas.row(2 * i + 1) = Moved(prior, findings.map_xi, i, kMoved).transpose();
+  }
+  const std::optional<Matrix> outputs = RunAt(*findings.problem, thetas, times.time_s);
+  if (!outputs) return false;
+  const std::vector<int> rows = RowsOf(findings.record->beginning(), m, aliased.channel);
+  for (Eigen::Index run = 0; run < outputs->rows(); ++run) {
+    const Vector channel = outputs->row(run)(Eigen::seq(aliased.channel, Eigen::last, m));
+    const double largest = channel.cwiseAbs().maxCoeff();
+    const double least = kSwing * Deviation(findings, aliased.channel, largest, largest);
+    const double turns = TurnsBetweenSamples(channel, rows, least);
+    if (turns > 0 && std::abs(turns - aliased.turns) >= 1) return true;
+  }
+  return false;
+}
+
+void AddAliasing(const Findings& findings, const Estimate& estimate,
+                 std::vector<Diagnostic>& diagnostics) {
+  const bool tells = std::ranges::any_of(estimate.parameters, [](const ParameterEstimate& p) {
+    return p.verdict != Verdict::kNotIdentified;
+  });
+  if (!tells || dynamic_cast<const StateSpaceModel*>(findings.problem->model().get()) == nullptr) {
+    return;
+  }
+  const Times times = FineTimes(findings.record->beginning());
+  const Vector theta = findings.problem->prior().ToParameters(findings.map_xi);
+  const std::optional<Matrix> outputs = RunAt(*findings.problem, theta.transpose(), times.time_s);
+  if (!outputs) return;
+  const auto aliased = AliasedChannel(findings, outputs->row(0).transpose());
+  if (!aliased || !PriorAllowsOtherTurns(findings, times, *aliased)) return;
+  const auto channel = static_cast<size_t>(aliased->channel);
+  diagnostics.push_back(
+      {DiagnosticCode::kUndersampled,
+       absl::StrFormat("at the estimate, %s has %.2g turning points between two samples: other "
+                       "values, with a slower or faster response, may fit as well; sample more "
+                       "often or at uneven times, or narrow the prior",
+                       estimate.channels[channel].output, aliased->turns)});
+}
+
+}  // namespace
+
+void AddUndersampling(const Findings& findings, const Estimate& estimate,
+                      std::vector<Diagnostic>& diagnostics) {
+  if (findings.record->beginning().count() == 0 || !findings.problem->streamed_inputs().empty()) {
+    return;
+  }
+  for (int i = 0; i < findings.problem->dimension(); ++i) {
+    const ParameterEstimate& parameter = estimate.parameters[static_cast<size_t>(i)];
+    if (parameter.verdict != Verdict::kNotIdentified) continue;
+    const SamplingInformation information = InformationBetweenSamples(findings, i);
+    if (!information.undersampled) continue;
+    diagnostics.push_back(
+        {DiagnosticCode::kUndersampled,
+         absl::StrFormat("the samples miss what %s changes: as many samples between them would "
+                         "know it %.0f times better than the prior (in variance); sample at other "
+                         "times, or more often",
+                         parameter.name, information.between)});
+  }
+  AddAliasing(findings, estimate, diagnostics);
 }
 
 }  // namespace polyest::internal

@@ -1,26 +1,29 @@
 #pragma once
 
-// Detects samples that miss what a parameter changes (§3.2): two samples per period can fall on
-// every zero crossing. Let y(t) be the measured outputs and s the parameter in units of its prior
-// standard deviation. The information of samples at times t_k relative to the prior's is Σ_k
-// (∂y/∂s)²/R. It is compared at the sample times and at as many times between them.
+// Detects samples that are too far apart.
+//
+// They can miss what a parameter changes (§3.2): two samples per period can fall on every zero
+// crossing. Let y(t) be the measured outputs and s the parameter in units of its prior standard
+// deviation. The information of samples at times t_k relative to the prior's is Σ_k (∂y/∂s)²/R. It
+// is compared at the sample times and at as many times between them.
+//
+// And they can be taken for those of another response: a vibration faster than half the sampling
+// rate has the samples of one that is slower or faster by the sampling rate. Minima that lie so far
+// apart are found in few dimensions only, so that an estimate at one of them asks for a warning.
 
-#include "core/estimator/expansion/regional_expansion.h"
-#include "core/estimator/problem/resolved_problem.h"
+#include <vector>
+
+#include "core/estimator/posterior/diagnosis.h"
 
 namespace polyest::internal {
 
-struct SamplingInformation {
-  double at_samples = 0;
-  double between = 0;  // the largest over several phases of the intervals, the samples included
-  bool undersampled = false;
-};
-
-// Returns the information, from runs of the model over the beginning of the record with the
-// parameter moved by half a prior standard deviation to each side of the estimate (at most to the
-// bounds of Ω). Returns zeros for a problem with streamed inputs or if the model cannot be run.
-SamplingInformation InformationBetweenSamples(const ResolvedProblem& problem,
-                                              const LearnedNoise& noise, const RowBlock& beginning,
-                                              const Vector& map_xi, int parameter);
+// Appends UNDERSAMPLED for each parameter that is not identified and that samples at other times
+// would identify, and where the response at an estimate that tells of the data has more than one
+// turning point between two evenly spaced samples, and another number for other values that the
+// prior allows. The model runs over the beginning of the record, once and then, where it turns that
+// often, with each parameter moved. Appends nothing for a problem with streamed inputs, for a model
+// that simulates itself as far as turning points are concerned, or if the model cannot be run.
+void AddUndersampling(const Findings& findings, const Estimate& estimate,
+                      std::vector<Diagnostic>& diagnostics);
 
 }  // namespace polyest::internal

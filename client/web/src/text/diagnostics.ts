@@ -76,7 +76,7 @@ const EXPLANATIONS: Record<string, Explanation> = {
   },
   UNDERSAMPLED: {
     title: 'Samples miss what matters',
-    meaning: 'The samples miss what a parameter changes: two samples a period may all fall on zero crossings.',
+    meaning: 'The samples miss what a parameter changes, as two samples a period on zero crossings do, or may be those of a slower or faster response as well.',
     remedy: 'Sample more often, or at other times; `polyest design` finds good ones.',
     severity: 'notice',
   },

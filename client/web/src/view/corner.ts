@@ -27,7 +27,7 @@ function rangeOf(values: readonly number[]): Range {
 }
 
 export class CornerPlot {
-  readonly element = h('div.corner', { role: 'img' });
+  readonly element = h('div.corner', { role: 'img', 'aria-label': 'Posterior, not computed yet' });
   private readonly canvas = h('canvas');
   private readonly resizing = new ResizeObserver(() => this.draw());
   private readonly onTheme = (): void => this.draw();
