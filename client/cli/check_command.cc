@@ -32,6 +32,7 @@ constexpr int kMaxLines = 20;
 struct Findings {
   std::vector<std::string> errors;
   std::vector<std::string> warnings;
+  int unlisted = 0;     // errors that one of `errors` only counts
   std::string summary;  // empty if there are errors
 
   // Adds an error whose message names the file, as those of reading a file do.
@@ -55,7 +56,8 @@ std::optional<v1::Measurements> ReadRows(const std::string& file, const DataColu
   auto data = ReadData(file, columns, note);
   if (!data.ok()) findings.AddError(data.status());
   if (refused > kMaxLines) {
-    findings.errors.push_back(absl::StrCat(file, ": … and ", refused - kMaxLines, " more"));
+    findings.unlisted = refused - kMaxLines;
+    findings.errors.push_back(absl::StrCat(file, ": … and ", findings.unlisted, " more"));
   }
   if (!data.ok()) return std::nullopt;
   return *std::move(data);
@@ -167,7 +169,8 @@ int RunCommand(const CheckArguments& arguments, std::ostream& out, std::ostream&
   for (const std::string& error : findings.errors) {
     err << Paint(err, Color::kRed, "polyest:") << ' ' << error << '\n';
   }
-  const size_t count = findings.errors.size();
+  const auto listed = std::ssize(findings.errors);
+  const auto count = findings.unlisted > 0 ? listed - 1 + findings.unlisted : listed;
   err << "polyest: " << count << (count == 1 ? " error" : " errors") << std::endl;
   return kExitBadInput;
 }

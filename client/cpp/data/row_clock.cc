@@ -1,6 +1,7 @@
 #include "client/cpp/data/row_clock.h"
 
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
 
 #include <cmath>
 #include <utility>
@@ -14,6 +15,10 @@ namespace {
 using TimeZero = DataFileOptions::TimeZero;
 
 constexpr double kNanosecondsPerSecond = 1e9;
+constexpr double kHalfADay_s = 43'200;
+
+// Times of 1.8e9 s that differ by microseconds must differ in a message, too.
+std::string Text(double time_s) { return absl::StrFormat("%.15g", time_s); }
 
 DateOrder OrderOf(DataFileOptions::DateOrder order) {
   switch (order) {
@@ -55,10 +60,10 @@ absl::Status RowClock::Read(absl::string_view text, CellTime& time) {
 
 absl::Status RowClock::Error(absl::string_view cell, double time_s, absl::string_view rule) const {
   if (column_.name.header == "t" && column_.conversion.IsIdentity() && !from_first_row_) {
-    return absl::InvalidArgumentError(absl::StrCat(time_s, " must be ", rule));
+    return absl::InvalidArgumentError(absl::StrCat(Text(time_s), " must be ", rule));
   }
   return absl::InvalidArgumentError(
-      absl::StrCat(QuoteCell(cell), ", which is t = ", time_s, " s, must be ", rule));
+      absl::StrCat(QuoteCell(cell), ", which is t = ", Text(time_s), " s, must be ", rule));
 }
 
 absl::Status RowClock::CheckForm(const CellTime& time) const {
@@ -98,11 +103,13 @@ absl::Status RowClock::Next(const CellTime& time, int32_t run, absl::string_view
   }
   if (!begins && time_s <= time_s_ && !options_.any_order) {
     const bool again = std::exchange(went_back_, true);
-    return Error(
-        cell, time_s,
-        absl::StrCat("later than ", time_s_,
-                     again ? ", where the time went back" : " of the row before",
-                     time_s < time_s_ ? "; a new run needs a column run that changes" : ""));
+    const bool midnight = time.form == CellTime::kTimeOfDay && time_s_ - time_s > kHalfADay_s;
+    return Error(cell, time_s,
+                 absl::StrCat("later than ", Text(time_s_),
+                              again ? ", where the time went back" : " of the row before",
+                              midnight           ? "; a record that passes midnight needs dates"
+                              : time_s < time_s_ ? "; a new run needs a column run that changes"
+                                                 : ""));
   }
   if (rows_ == 0) {
     first_ = time;

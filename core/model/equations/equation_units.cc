@@ -1,5 +1,6 @@
 #include "core/model/equations/equation_units.h"
 
+#include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 
 #include <optional>
@@ -32,7 +33,8 @@ class ModelUnits {
     }
     for (const Definition& definition : read_.states) {
       const std::optional<Unit> unit = Find(definition.name);
-      Check(definition, unit ? std::optional(*unit / second) : std::nullopt, ", that of it per s");
+      Check(definition, unit ? std::optional(*unit / second) : std::nullopt,
+            absl::StrCat(", that of ", definition.name, " per s"));
     }
     std::map<std::string, std::string> outputs;
     for (const Definition& definition : read_.outputs) {
@@ -75,7 +77,7 @@ class ModelUnits {
   // Returns the expected unit if it is known, else the unit of the expression. Reports a difference
   // between the two.
   std::optional<Unit> Check(const Definition& definition, const std::optional<Unit>& expected,
-                            const char* reason) {
+                            std::string_view reason) {
     const absl::StatusOr<std::optional<Unit>> unit = InferUnit(definition.syntax, units_);
     if (!unit.ok()) {
       problems_.push_back(unit.status());

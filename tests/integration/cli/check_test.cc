@@ -91,6 +91,7 @@ TEST_F(CheckTest, CountsTheBadLinesThatItDoesNotShow) {
   const std::vector<std::string> lines = Lines(run.err);
   EXPECT_THAT(lines, SizeIs(22));
   EXPECT_THAT(lines[20], HasSubstr("d.csv: … and 30 more"));
+  EXPECT_EQ(lines[21], "polyest: 50 errors");
 }
 
 TEST_F(CheckTest, AnswersInJson) {

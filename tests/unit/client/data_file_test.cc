@@ -150,6 +150,12 @@ TEST(DataReader, RefusesTimesThatGoBackStandStillOrAreNegative) {
             "data.csv:4: column t: 1.5 must be later than 2 of the row before; a new run needs a "
             "column run "
             "that changes");
+  EXPECT_EQ(ErrorOf("t,x\n1769903998.0625,1\n1769903998.03125,2\n"),
+            "data.csv:3: column t: 1769903998.03125 must be later than 1769903998.0625 of the row "
+            "before; a new run needs a column run that changes");
+  EXPECT_EQ(ErrorOf("t,x\n23:59:59.5,1\n00:00:00.5,2\n"),
+            "data.csv:3: column t: 0.5 must be later than 86399.5 of the row before; a record that "
+            "passes midnight needs dates");
   EXPECT_EQ(ErrorOf("t,run,x\n0,0,1\n0,1,2\n0,1,3\n"),
             "data.csv:4: column t: 0 must be later than 0 of the row before");
   EXPECT_EQ(ErrorOf("t,x\n-1,1\n"),

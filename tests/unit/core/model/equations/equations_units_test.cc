@@ -102,7 +102,7 @@ TEST(EquationUnits, OfAnExpressionAreThoseOfItsName) {
                 .outputs = {{"y", "x"}},
                 .units = {{"x", "m"}, {"v", "m/s"}, {"k", "N/m"}}}),
       ElementsAre("model.equations.states.v: the expression has the unit N; it must have m/s^2, "
-                  "that of it per s"));
+                  "that of v per s"));
   EXPECT_THAT(Messages({.outputs = {{"y", "a + x"}},
                         .intermediates = {{"a", "2*F"}},
                         .units = {{"x", "m"}, {"F", "N"}}}),
