@@ -228,18 +228,21 @@ class Warnings {
     const ColumnFacts& column = columns_[channel];
     const std::string& name = measured.output;
     if (column.samples < 3 || column.smallest == column.largest) return;
+    const bool is_unknown = measured.noise.unknown || IsNoiseSet(problem_, name);
     if (const auto coarse = CoarseStepsOf(problem_, channel, column, FitOf(channel))) {
       AddCoarseSteps(name, *coarse);
-    } else if (!measured.noise.unknown && !IsNoiseSet(problem_, name)) {
+    } else if (!is_unknown) {
       AddSizeOfNoise(name, column);
     }
-    if (measured.noise.unknown || IsNoiseSet(problem_, name)) return;
     // Noise with a part relative to the largest value so far is that small only during rest.
     if (measured.noise.relative_to_max == 0 && column.min_noise < kNoiseRange * column.max_noise) {
-      Add("%s: its noise goes down to %g, so that the samples near 0 outweigh all others; give it "
+      Add("%s: its noise goes down to %s, so that the samples near 0 outweigh all others; give it "
           "an absolute part",
-          name, column.min_noise);
+          name,
+          is_unknown ? "less than a thousandth of the largest"
+                     : absl::StrFormat("%g", column.min_noise));
     }
+    if (is_unknown) return;
     AddRunningMaximum(measured, column);
   }
 

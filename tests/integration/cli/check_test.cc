@@ -125,10 +125,14 @@ TEST_F(CheckTest, WarnsOfDataThatDeserveASecondLook) {
 TEST_F(CheckTest, WarnsOfNoiseThatVanishesWithTheSignal) {
   std::string problem = kProblem;
   problem.replace(problem.find("absolute"), 8, "relative");
-  const Finished run = Run({"check", File("p.json", problem),
-                            File("d.csv", "t,x,force\n0,1,0\n0.1,0.0001,1\n0.2,-1,0\n")});
+  const std::string data = File("d.csv", "t,x,force\n0,1,0\n0.1,0.0001,1\n0.2,-1,0\n");
+  const Finished run = Run({"check", File("p.json", problem), data});
   EXPECT_EQ(run.exit_status, 0) << run.err;
   EXPECT_THAT(run.out, HasSubstr("x: its noise goes down to 1e-06"));
+  problem.replace(problem.find("\"relative"), 0, "\"unknown\": true, ");
+  const Finished unknown = Run({"check", File("p.json", problem), data});
+  EXPECT_EQ(unknown.exit_status, 0) << unknown.err;
+  EXPECT_THAT(unknown.out, HasSubstr("x: its noise goes down to less than a thousandth"));
 }
 
 TEST_F(CheckTest, ChecksWhatInitWrites) {
