@@ -62,7 +62,7 @@ std::optional<Matrix> RunAt(const ResolvedProblem& problem, const Matrix& thetas
   return outputs;
 }
 
-// Returns scores in which parameter i is moved from the estimate by a number of prior standard
+// Returns the score of parameter i moved from the estimate by a number of prior standard
 // deviations, at most to the bounds of Ω. Scores are used because with them a parameter can move
 // alone.
 double MovedScore(const Prior& prior, const Vector& map_z, int i, double deviations) {

@@ -18,11 +18,11 @@
 namespace polyest::internal {
 
 // Appends UNDERSAMPLED for each parameter that is not identified and that samples at other times
-// would identify, and where the response at an estimate that tells of the data has more than one
-// turning point between two evenly spaced samples, and another number for other values that the
-// prior allows. The model runs over the beginning of the record, once and then, where it turns that
-// often, with each parameter moved. Appends nothing for a problem with streamed inputs, for a model
-// that simulates itself as far as turning points are concerned, or if the model cannot be run.
+// would identify. Appends it, too, if the response at an estimate that tells of the data has more
+// than one turning point between two evenly spaced samples, and another number for other values
+// that the prior allows; this is not examined for models that simulate themselves. The model runs
+// over the beginning of the record. Appends nothing if it cannot be run there, or for a problem
+// with streamed inputs, which are not known between rows.
 void AddUndersampling(const Findings& findings, const Estimate& estimate,
                       std::vector<Diagnostic>& diagnostics);
 
