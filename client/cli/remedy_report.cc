@@ -139,6 +139,12 @@ void PrintVerdict(const RemedyTrial& trial, std::ostream& out) {
     PrintSentence(out, absl::StrCat("Even so, warnings remain (", Remaining(best.assessment),
                                     "): the problem probably needs another remedy as well, or the "
                                     "model lacks a term."));
+  } else if (best.remedy.kind == Remedy::Kind::kCorrelatedNoise) {
+    PrintSentence(out,
+                  "Correlated noise also takes up what a model lacks, such as friction or a "
+                  "sensor's gain: no warning remains then, and estimates can be off by more than "
+                  "their intervals. If the model may lack a term, compare models with and without "
+                  "it by polyest compare first.");
   }
   PrintJson(best, out);
 }

@@ -206,6 +206,7 @@ TEST_F(RemediesTest, CorrelatedNoiseIsPreferredWhereTheSensorWanders) {
   }
   EXPECT_THAT(Explain(PerfectOscillator(kReleased, kStiffness), File("record.csv", record)),
               AllOf(HasSubstr("The evidence prefers correlated noise of x, by "),
+                    HasSubstr("Correlated noise also takes up what a model lacks"),
                     HasSubstr(R"("correlation":{"auto":true})")));
 }
 
