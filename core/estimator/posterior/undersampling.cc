@@ -146,6 +146,12 @@ bool AreEven(const RowBlock& beginning, const std::vector<int>& rows) {
   return std::sqrt(squares / static_cast<double>(rows.size())) <= kUneven * interval;
 }
 
+// Returns an output at all times of one of the runs.
+Vector OutputOf(const Matrix& outputs, Eigen::Index run, int channel, int channels) {
+  return Vector::NullaryExpr(outputs.cols() / channels,
+                             [&](Eigen::Index i) { return outputs(run, i * channels + channel); });
+}
+
 // Returns the number of turning points between two samples, the mean up to the last one; 0 where
 // there are too few. `outputs` is a channel at all times of FineTimes, and what it swings by less
 // than `least` does not count.
@@ -177,16 +183,16 @@ struct Aliased {
   double turns = 0;
 };
 
-// Returns the channel that turns the least of all that turn, unless it turns once between two
-// samples at most or these are uneven.
-std::optional<Aliased> AliasedChannel(const Findings& findings, const Vector& outputs) {
+// Returns the channel that turns the least of all that turn in a run, unless it turns once between
+// two samples at most or these are uneven.
+std::optional<Aliased> AliasedChannel(const Findings& findings, const Matrix& outputs) {
   const RowBlock& beginning = findings.record->beginning();
   const int m = findings.problem->channels();
   std::optional<Aliased> least;
   for (int c = 0; c < m; ++c) {
     const std::vector<int> rows = RowsOf(beginning, m, c);
     if (std::ssize(rows) < kFewestRows) continue;
-    const Vector channel = outputs(Eigen::seq(c, Eigen::last, m));
+    const Vector channel = OutputOf(outputs, 0, c, m);
     const double largest = channel.cwiseAbs().maxCoeff();
     const double turns =
         TurnsBetweenSamples(channel, rows, kSwing * Deviation(findings, c, largest, largest));
@@ -211,7 +217,7 @@ bool PriorAllowsOtherTurns(const Findings& findings, const Times& times, const A
   if (!outputs) return false;
   const std::vector<int> rows = RowsOf(findings.record->beginning(), m, aliased.channel);
   for (Eigen::Index run = 0; run < outputs->rows(); ++run) {
-    const Vector channel = outputs->row(run)(Eigen::seq(aliased.channel, Eigen::last, m));
+    const Vector channel = OutputOf(*outputs, run, aliased.channel, m);
     const double largest = channel.cwiseAbs().maxCoeff();
     const double least = kSwing * Deviation(findings, aliased.channel, largest, largest);
     const double turns = TurnsBetweenSamples(channel, rows, least);
@@ -232,7 +238,7 @@ void AddAliasing(const Findings& findings, const Estimate& estimate,
   const Vector theta = findings.problem->prior().ToParameters(findings.map_xi);
   const std::optional<Matrix> outputs = RunAt(*findings.problem, theta.transpose(), times.time_s);
   if (!outputs) return;
-  const auto aliased = AliasedChannel(findings, outputs->row(0).transpose());
+  const auto aliased = AliasedChannel(findings, *outputs);
   if (!aliased || !PriorAllowsOtherTurns(findings, times, *aliased)) return;
   const auto channel = static_cast<size_t>(aliased->channel);
   diagnostics.push_back(
