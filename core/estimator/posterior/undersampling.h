@@ -7,9 +7,9 @@
 // deviation. The information of samples at times t_k relative to the prior's is Σ_k (∂y/∂s)²/R. It
 // is compared at the sample times and at as many times between them.
 //
-// And they can be taken for those of another response: a vibration faster than half the sampling
-// rate has the samples of one that is slower or faster by the sampling rate. Minima that lie so far
-// apart are found in few dimensions only, so that an estimate at one of them asks for a warning.
+// They can also fit several responses: two vibrations whose frequencies differ by the sampling rate
+// have the same samples. The cost then has minima that lie far apart, which the search finds in few
+// dimensions only. An estimate at one of them asks for a warning.
 
 #include <vector>
 

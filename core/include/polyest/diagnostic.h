@@ -9,7 +9,7 @@ namespace polyest {
 // What a diagnostic warns of.
 enum class DiagnosticCode {
   kNotIdentified,        // the verdict on a parameter is kNotIdentified
-  kUndersampled,         // the samples are too far apart to tell
+  kUndersampled,         // samples miss what changes, or fit other responses
   kExpansionInaccurate,  // the expansion or integration is too inaccurate; uncertainty widened
   kModelMisfit,          // residuals far from what the noise would leave
   kAtPriorBound,         // the estimate lies on a bound of the prior

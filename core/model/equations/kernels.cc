@@ -28,22 +28,27 @@ void ForRows(double* result, Eigen::Index rows, const Function& function) {
   }
 }
 
+// Applies an operation to as many of the operands as it has.
+template <Operation operation>
+Lane ApplyAt(Eigen::Index row, const Operand& a, const Operand& b, const Operand& c) {
+  using Function = LaneFunction<operation>;
+  if constexpr (Operands(operation) == 1) {
+    return Function::Apply(a.At(row));
+  } else if constexpr (Operands(operation) == 2) {
+    return Function::Apply(a.At(row), b.At(row));
+  } else {
+    return Function::Apply(a.At(row), b.At(row), c.At(row));
+  }
+}
+
 template <Operation operation>
 void Single(const Instruction& instruction, double* const* slots, Eigen::Index rows) {
   const Operand a(instruction, 0, slots), b(instruction, 1, slots), c(instruction, 2, slots);
-  ForRows(slots[instruction.result], rows, [&](Eigen::Index row) -> Lane {
-    using Function = LaneFunction<operation>;
-    if constexpr (Operands(operation) == 1) {
-      return Function::Apply(a.At(row));
-    } else if constexpr (Operands(operation) == 2) {
-      return Function::Apply(a.At(row), b.At(row));
-    } else {
-      return Function::Apply(a.At(row), b.At(row), c.At(row));
-    }
-  });
+  ForRows(slots[instruction.result], rows,
+          [&](Eigen::Index row) { return ApplyAt<operation>(row, a, b, c); });
 }
 
-// Applies a function to operands; `inner` stands in the place of one of them.
+// Applies an operation; `inner` is its operand at the position, x and y are the others in order.
 template <Operation operation, int kPosition>
 Lane ApplyWith(const Lane& inner, const Lane& x, const Lane& y) {
   using Function = LaneFunction<operation>;
@@ -59,14 +64,8 @@ void Pair(const Instruction& instruction, double* const* slots, Eigen::Index row
   constexpr int kOfInner = Operands(kInner);
   const Operand a(instruction, 0, slots), b(instruction, 1, slots), c(instruction, 2, slots),
       x(instruction, kOfInner, slots), y(instruction, kOfInner + 1, slots);
-  ForRows(slots[instruction.result], rows, [&](Eigen::Index row) -> Lane {
-    if constexpr (kOfInner == 2) {
-      const Lane inner = LaneFunction<kInner>::Apply(a.At(row), b.At(row));
-      return ApplyWith<operation, kPosition>(inner, x.At(row), y.At(row));
-    } else {
-      const Lane inner = LaneFunction<kInner>::Apply(a.At(row), b.At(row), c.At(row));
-      return ApplyWith<operation, kPosition>(inner, x.At(row), y.At(row));
-    }
+  ForRows(slots[instruction.result], rows, [&](Eigen::Index row) {
+    return ApplyWith<operation, kPosition>(ApplyAt<kInner>(row, a, b, c), x.At(row), y.At(row));
   });
 }
 

@@ -79,10 +79,9 @@ void Program::Run(double time_s, std::span<const ConstBlock* const> blocks, Bloc
   double** const slots = scratch.slots.data();
   Lane time = Lane::Constant(time_s);
   slots[0] = time.data();
+  double** next = slots + 1;
   // Kernels only read the slots of operands, so the cast is safe: see Kernel.
-  for (size_t i = 0; i < constants_.size(); ++i) {
-    slots[1 + i] = const_cast<double*>(constants_[i].data());
-  }
+  for (const Lane& constant : constants_) *next++ = const_cast<double*>(constant.data());
   double* const registers = scratch.registers.data();
   for (size_t i = 0; i < of_time_.size(); ++i) {
     slots[of_time_[i].result] = registers + static_cast<Eigen::Index>(i) * kLanes;

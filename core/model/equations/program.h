@@ -8,9 +8,9 @@
 // those of the program's last run in this thread; a quotient whose divisor is one of them becomes a
 // product with its reciprocal. An intermediate value occupies a register of kRows rows for as long
 // as it is needed. A product that is only added or subtracted once is fused with that sum into one
-// operation; and an operation takes another into its instruction that only it reads, since what
-// an instruction stores and loads takes longer than what it computes. The first run in a thread may
-// allocate memory; later runs do not.
+// operation. An instruction computes two operations where nothing but the second reads the result
+// of the first, because loading and storing take longer than computing. The first run in a thread
+// may allocate memory; later runs do not.
 
 #include <cstdint>
 #include <span>

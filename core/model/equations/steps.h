@@ -1,7 +1,8 @@
 #pragma once
 
 // The nodes of a graph as a program computes them: divisions by what depends on parameters alone
-// are products, and two operations are one where that saves an instruction.
+// are products, a product and a sum are one operation, and two operations are one step where only
+// the second reads the first.
 
 #include <array>
 #include <limits>
@@ -22,9 +23,11 @@ struct Inner {
   int position;  // of its result among the operands of the other operation
 };
 
+// One instruction: an operation, or two.
 struct Step {
   Operation operation = Operation::kConstant;
-  std::array<NodeId, Instruction::kMostOperands> operands{};  // −1 after the last; first `inner`'s
+  // Those of `inner` come first, then the others in order; −1 after the last.
+  std::array<NodeId, Instruction::kMostOperands> operands{};
   std::optional<Inner> inner = std::nullopt;
   int uses = 0;       // number of steps and roots that read it
   int last_use = -1;  // position of the last instruction that reads it

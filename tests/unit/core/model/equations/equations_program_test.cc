@@ -97,18 +97,21 @@ Program OfParameters(const std::vector<std::string>& texts, bool keeps = true) {
   return Program(graph, roots, places, {}, keeps ? 1 : Program::kNone);
 }
 
-// The oracle is one operation after the other.
-TEST(EquationProgram, ComputesTwoOperationsByOneInstruction) {
+constexpr int kInner = -1;  // the result of the inner operation
+
+// Two operations, and the expression that means them.
+struct TwoOperations {
+  const char* text;
+  Operation inner;
+  std::array<int, 3> operands_of_inner;  // of a, b, c, d
+  Operation outer;
+  std::array<int, 3> operands_of_outer;  // as well, or kInner
+};
+
+std::vector<TwoOperations> KindsOfTwoOperations() {
   using enum Operation;
-  struct Case {
-    const char* text;
-    Operation inner;
-    std::array<int, 3> operands_of_inner;  // of a, b, c, d
-    Operation outer;
-    std::array<int, 3> operands_of_outer;  // −1 for the result of the inner operation
-  };
-  constexpr int kInner = -1, kNone = 0;
-  const std::vector<Case> cases = {
+  constexpr int kNone = 0;
+  return {
       {"a + b + c", kAdd, {0, 1, kNone}, kAdd, {kInner, 2, kNone}},
       {"a - b - c", kSubtract, {0, 1, kNone}, kSubtract, {kInner, 2, kNone}},
       {"c - (a + b)", kAdd, {0, 1, kNone}, kSubtract, {2, kInner, kNone}},
@@ -128,8 +131,12 @@ TEST(EquationProgram, ComputesTwoOperationsByOneInstruction) {
       {"a*b + c - d*a", kMultiplyAdd, {0, 1, 2}, kSubtractMultiplied, {3, 0, kInner}},
       {"(a - b) - c*d", kSubtract, {0, 1, kNone}, kSubtractMultiplied, {2, 3, kInner}},
   };
+}
+
+// The oracle is one operation after the other.
+TEST(EquationProgram, ComputesTwoOperationsByOneInstruction) {
   const auto random = Eigen::ArrayXXd::Random(Program::kRows + kLanes, 4).eval();
-  for (const Case& one : cases) {
+  for (const TwoOperations& one : KindsOfTwoOperations()) {
     const Program program = Shared({one.text}).Compile();
     EXPECT_EQ(program.instructions(), 1) << one.text;
     Eigen::ArrayXXd results(random.rows(), 1);
