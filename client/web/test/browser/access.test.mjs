@@ -69,7 +69,7 @@ test('a reader’s token is enough: nothing on the page asks for more', options,
   daemon.requests.length = 0;
   const page = await open(browser, `${daemon.address}#/monday`);
   await enter(page, TOKEN);
-  await page.waitForSelector('.corner[aria-label]');
+  await page.waitForSelector('.corner[aria-label^="Posterior of"]');
   for (const name of ['Freeze', 'Freeze', 'Whole prior', 'Whole run', 'Draw now']) {
     await page.getByRole('button', { name }).click();
   }

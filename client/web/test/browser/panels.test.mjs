@@ -191,6 +191,7 @@ test('a prediction that fails is said, and the rest goes on', options, async () 
   await says(page, 'No new prediction: too few trajectories can be integrated');
   await says(page, 'No new picture: the daemon is short of memory');
   await status(page, 'Live');
+  assert.deepEqual(await findings(page), [], 'a picture that has never come has a name, too');
   daemon.fail('Predict', null);
   daemon.fail('ComputePosterior', null);
   await says(page, 'Measured and predicted: x', 20_000);
@@ -202,7 +203,7 @@ for (const colorScheme of ['light', 'dark']) {
     test(`${colorScheme}, ${width} pixels wide: fits, and can be used by all`, options, async () => {
       const page = await open(browser, `${daemon.address}#/monday`, { colorScheme, width, height: width > 500 ? 900 : 844 });
       await status(page, 'Live');
-      await page.waitForSelector('.corner[aria-label]');
+      await page.waitForSelector('.corner[aria-label^="Posterior of"]');
       await seeAll(page);
       assert.ok(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth), 'nothing sticks out');
       assert.deepEqual(await findings(page), []);
