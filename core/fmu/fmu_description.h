@@ -17,8 +17,11 @@ enum class FmuKind : uint8_t { kModelExchange, kCoSimulation };
 
 // A variable of type Real, Float64 or Float32.
 struct FmuVariable {
+  static constexpr int kNoState = -1;
+
   uint32_t reference = 0;  // FMI's value reference
   bool is_float32 = false;
+  int state = kNoState;  // its index in the FMU's state vector if it is a continuous state
 };
 
 struct FmuInterface {
@@ -28,6 +31,9 @@ struct FmuInterface {
   std::string identifier;  // the library's file name without .so
   std::string token;       // guid or instantiationToken
   int states = 0;          // number of continuous states
+  // Whether the derivatives may depend on the time itself. They may unless the FMU declares the
+  // independent variable and, for each derivative, dependencies without it.
+  bool derivatives_use_time = true;
   int event_indicators = 0;
   bool needs_completed_step = false;  // whether it must be notified of each completed step
   bool once_per_process = false;      // whether a process can hold one instance only

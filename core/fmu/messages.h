@@ -111,14 +111,15 @@ void Fields(Archive& archive, PointFailure& failure) {
 }
 template <class Archive>
 void Fields(Archive& archive, FmuVariable& variable) {
-  archive(variable.reference, variable.is_float32);
+  archive(variable.reference, variable.is_float32, variable.state);
 }
 template <class Archive>
 void Fields(Archive& archive, FmuInterface& interface) {
   archive(interface.version, interface.kind, interface.name, interface.identifier, interface.token,
-          interface.states, interface.event_indicators, interface.needs_completed_step,
-          interface.once_per_process, interface.can_save_state, interface.can_interpolate_inputs,
-          interface.can_vary_step, interface.communication_step_s);
+          interface.states, interface.derivatives_use_time, interface.event_indicators,
+          interface.needs_completed_step, interface.once_per_process, interface.can_save_state,
+          interface.can_interpolate_inputs, interface.can_vary_step,
+          interface.communication_step_s);
 }
 template <class Archive>
 void Fields(Archive& archive, StartMessage& start) {

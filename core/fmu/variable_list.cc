@@ -4,7 +4,9 @@
 #include <absl/strings/numbers.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
+#include <absl/strings/str_split.h>
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -120,6 +122,24 @@ absl::Status VariableList::AddState(const Variable& derivative, size_t state) {
   return absl::OkStatus();
 }
 
+// Dependencies name variables as the rest of the structure does: by 1-based index in FMI 2, by
+// value reference in FMI 3. Without the attribute, a derivative depends on everything. What is not
+// declared cannot be named.
+void VariableList::NoteTime(const pugi::xml_node& unknown, int version) {
+  const auto time = std::ranges::find(variables_, "independent", &Variable::causality);
+  const pugi::xml_attribute dependencies = unknown.attribute("dependencies");
+  if (time == variables_.end() || !dependencies) {
+    derivatives_use_time_ = true;
+    return;
+  }
+  const std::string name = absl::StrCat(version == 2 ? time - variables_.begin() + 1
+                                                     : ptrdiff_t{time->variable.reference});
+  for (const absl::string_view known :
+       absl::StrSplit(dependencies.value(), absl::ByAnyChar(" \t\r\n"), absl::SkipEmpty())) {
+    derivatives_use_time_ = derivatives_use_time_ || known == name;
+  }
+}
+
 absl::Status VariableList::FindStates2(const pugi::xml_node& structure) {
   for (const pugi::xml_node unknown : structure.child("Derivatives").children("Unknown")) {
     const size_t index = unknown.attribute("index").as_uint();
@@ -130,6 +150,7 @@ absl::Status VariableList::FindStates2(const pugi::xml_node& structure) {
     const Variable derivative = variables_[index - 1];
     POLYEST_RETURN_IF_ERROR(
         AddState(derivative, static_cast<size_t>(derivative.derivative_of) - 1));
+    NoteTime(unknown, 2);
   }
   return absl::OkStatus();
 }
@@ -154,6 +175,7 @@ absl::Status VariableList::FindStates3(const pugi::xml_node& structure) {
     const Variable derivative = variables_[index];
     POLYEST_RETURN_IF_ERROR(
         AddState(derivative, find(static_cast<uint32_t>(derivative.derivative_of))));
+    NoteTime(node, 3);
   }
   for ([[maybe_unused]] const pugi::xml_node node : structure.children("EventIndicator")) {
     ++event_indicators_;
@@ -165,6 +187,10 @@ absl::StatusOr<std::vector<std::string>> VariableList::Sort(FmuKind kind,
                                                             FmuDescription& description) const {
   std::vector<std::string> kept;
   absl::flat_hash_set<std::string> names;
+  absl::flat_hash_map<uint32_t, int> state_of;  // by value reference, which an alias shares
+  for (size_t i = 0; i < states_.size(); ++i) {
+    state_of.emplace(variables_[states_[i]].variable.reference, static_cast<int>(i));
+  }
   ModelDescription& model = description.model;
   for (const Variable& variable : variables_) {
     const Quantity& quantity = variable.quantity;
@@ -195,10 +221,13 @@ absl::StatusOr<std::vector<std::string>> VariableList::Sort(FmuKind kind,
     if (variable.causality == "output" || variable.is_state) {
       model.outputs.push_back(quantity);
       description.outputs.push_back(variable.variable);
+      const auto state = state_of.find(variable.variable.reference);
+      if (state != state_of.end()) description.outputs.back().state = state->second;
     }
   }
   for (const size_t state : states_) model.states.push_back(variables_[state].quantity);
   description.interface.states = static_cast<int>(states_.size());
+  description.interface.derivatives_use_time = derivatives_use_time_;
   description.interface.event_indicators = event_indicators_;
   return kept;
 }

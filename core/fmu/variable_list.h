@@ -49,9 +49,13 @@ class VariableList {
   absl::Status FindStates2(const pugi::xml_node& structure);
   absl::Status FindStates3(const pugi::xml_node& structure);
   absl::Status AddState(const Variable& derivative, size_t state);
+  // Notes whether the derivative may depend on the independent variable. `unknown` is its element
+  // of the model structure.
+  void NoteTime(const pugi::xml_node& unknown, int version);
 
   std::vector<Variable> variables_;
   std::vector<size_t> states_;  // in the order of the FMU's state vector
+  bool derivatives_use_time_ = false;
   int event_indicators_ = 0;
 };
 

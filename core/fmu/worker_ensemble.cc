@@ -9,7 +9,6 @@
 #include "core/common/check.h"
 #include "core/common/status.h"
 #include "core/fmu/conversation.h"
-#include "core/propagation/trajectory_block.h"
 
 namespace polyest::internal {
 namespace {
@@ -67,7 +66,7 @@ absl::Status WorkerEnsemble::StartWorkers() {
   const FmuInterface& interface = fmu_->description.interface;
   const bool alone = HoldsOneTrajectory(interface);
   if (alone && reserved_ == 0) POLYEST_RETURN_IF_ERROR(Reserve(points()));
-  const int block_size = alone || IsPointwise(interface) ? 1 : TrajectoryBlock::kPoints;
+  const int block_size = alone || IsPointwise(interface) ? 1 : kPointsOfBlock;
   const int blocks = (points() + block_size - 1) / block_size;
   const int count = alone ? blocks : std::max(1, std::min(specification_.threads, blocks));
   std::vector<Worker> workers(static_cast<size_t>(count));

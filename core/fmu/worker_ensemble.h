@@ -1,7 +1,7 @@
 #pragma once
 
 // An ensemble of an FMU's trajectories in worker processes. Points that are integrated together are
-// split into blocks of TrajectoryBlock::kPoints, others into blocks of one, and the blocks are
+// split into blocks of kPointsOfBlock, others into blocks of one, and the blocks are
 // distributed over as many workers as there may be threads. A block's results do not depend on the
 // worker's other blocks, so they are the same for any number of workers.
 //
@@ -24,6 +24,9 @@ namespace polyest::internal {
 class WorkerEnsemble final : public TrajectoryEnsemble {
  public:
   static constexpr int kMostOfOneTrajectory = 256;
+  // Calls of an FMU cost so much more than the arithmetic of an integrator that small blocks, which
+  // several workers can share, are better than wide ones.
+  static constexpr int kPointsOfBlock = 16;
 
   // Makes the ensemble. The processes start with the first Advance, which also reports an error of
   // starting them; RESOURCE_EXHAUSTED where there would be too many.

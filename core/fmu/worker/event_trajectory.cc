@@ -92,10 +92,8 @@ std::span<double> EventTrajectory::States(N_Vector vector) const {
 }
 
 bool EventTrajectory::SetPoint(double time_s, N_Vector states) {
-  if (!instance_->SetPoint(time_s, States(states))) return false;
-  if (factory_.inputs.empty()) return true;
   const Vector values = inputs_.At(time_s).row(0).matrix().transpose();
-  return instance_->SetInputs(values.data());
+  return instance_->SetPoint(time_s, States(states), values.data());
 }
 
 int EventTrajectory::RightHandSide(double time_s, N_Vector states, N_Vector derivatives,
@@ -219,7 +217,11 @@ bool EventTrajectory::CheckAccumulation() {
 
 bool EventTrajectory::ReadOutputs(double* outputs) {
   if (!failure_.reason.empty()) return false;
-  if (!SetPoint(time_s_, states_) || !instance_->GetOutputs(outputs)) {
+  const std::vector<int>& known = factory_.states_of_outputs;
+  for (size_t i = 0; i < known.size(); ++i) {
+    outputs[i] = States(states_)[static_cast<size_t>(known[i])];
+  }
+  if (known.empty() && (!SetPoint(time_s_, states_) || !instance_->GetOutputs(outputs))) {
     return FailSinceRead(instance_->failure());
   }
   const char* const reason =

@@ -19,7 +19,9 @@ std::vector<Quantity> Numbered(size_t count) {
 
 ExchangeModel::ExchangeModel(const InstanceFactory& factory,
                              std::vector<std::unique_ptr<Instance>> instances)
-    : instances_(std::move(instances)) {
+    : uses_time_(factory.interface.derivatives_use_time),
+      states_of_outputs_(factory.states_of_outputs),
+      instances_(std::move(instances)) {
   description_.states = Numbered(static_cast<size_t>(factory.interface.states));
   description_.parameters = Numbered(1);
   description_.inputs = Numbered(factory.inputs.size());
@@ -38,8 +40,7 @@ void ExchangeModel::ForEachRow(double time_s, const ConstBlock& states,
     Instance& instance = *instances_[static_cast<size_t>(parameters(row, 0))];
     if (states.cols() > 0) x = states.row(row).matrix();
     if (inputs.cols() > 0) u = inputs.row(row).matrix();
-    const bool good =
-        instance.SetPoint(time_s, point) && instance.SetInputs(u.data()) && read(instance, result);
+    const bool good = instance.SetPoint(time_s, point, u.data()) && read(instance, result);
     if (!good) result.setConstant(std::numeric_limits<double>::quiet_NaN());
     results.row(row) = result.array();
   }
@@ -66,8 +67,14 @@ void ExchangeModel::Derivatives(double time_s, const ConstBlock& states,
 
 void ExchangeModel::Outputs(double time_s, const ConstBlock& states, const ConstBlock& parameters,
                             const ConstBlock& inputs, Block outputs) const {
-  ForEachRow(time_s, states, parameters, inputs, outputs,
-             [](Instance& instance, Vector& result) { return instance.GetOutputs(result.data()); });
+  if (states_of_outputs_.empty()) {
+    ForEachRow(time_s, states, parameters, inputs, outputs, [](Instance& instance, Vector& result) {
+      return instance.GetOutputs(result.data());
+    });
+  }
+  for (size_t i = 0; i < states_of_outputs_.size(); ++i) {
+    outputs.col(static_cast<Eigen::Index>(i)) = states.col(states_of_outputs_[i]);
+  }
 }
 
 ExchangeEnsemble::ExchangeEnsemble(std::shared_ptr<const ExchangeModel> model,

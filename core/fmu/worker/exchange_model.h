@@ -26,6 +26,7 @@ class ExchangeModel final : public StateSpaceModel {
   }
 
   const ModelDescription& description() const override { return description_; }
+  bool uses_time() const override { return uses_time_; }
   void InitialStates(const ConstBlock& parameters, Block states) const override;
   void Derivatives(double time_s, const ConstBlock& states, const ConstBlock& parameters,
                    const ConstBlock& inputs, Block derivatives) const override;
@@ -40,6 +41,8 @@ class ExchangeModel final : public StateSpaceModel {
                   const ConstBlock& inputs, Block results, Read read) const;
 
   ModelDescription description_;
+  const bool uses_time_;
+  const std::vector<int> states_of_outputs_;  // see InstanceFactory
   std::vector<std::unique_ptr<Instance>> instances_;
 };
 

@@ -16,6 +16,8 @@ constexpr int kDiscard = 2;
 constexpr int kError = 3;
 constexpr int kMaxEventIterations = 1'000;
 
+bool IsGood(int status) { return status == 0 || status == kWarning; }
+
 const char* StatusInWords(int status) {
   switch (status) {
     case 2:
@@ -97,7 +99,7 @@ bool Instance::Do(FmuCall kind, Call call) {
   factory_.monitor->Enter(kind, point_, time_s_);
   const int status = call();
   factory_.monitor->Leave();
-  if (status == 0 || status == 1) return true;
+  if (IsGood(status)) return true;
   return Fail(status, absl::StrCat("the FMU ", StatusInWords(status), " while ", InWords(kind)));
 }
 
@@ -144,7 +146,19 @@ bool Instance::IterateEvents() {
 
 bool Instance::SetInputs(const double* values) {
   if (factory_.inputs.empty()) return !broken_;
-  return Do(FmuCall::kSetVariables, [&] { return binding_->Set(factory_.inputs, values); });
+  return Do(FmuCall::kSetVariables, [&] { return Pass(values); });
+}
+
+int Instance::Pass(const double* inputs) {
+  const size_t count = factory_.inputs.size();
+  if (!inputs_.empty() && std::equal(inputs_.begin(), inputs_.end(), inputs)) return 0;
+  inputs_.clear();
+  const int status = binding_->Set(factory_.inputs, inputs);
+  // An FMU that interpolates its inputs moves them away from what was set.
+  if (IsGood(status) && !factory_.interface.can_interpolate_inputs) {
+    inputs_.assign(inputs, inputs + count);
+  }
+  return status;
 }
 
 bool Instance::GetOutputs(double* values) {
@@ -152,10 +166,14 @@ bool Instance::GetOutputs(double* values) {
   return Do(FmuCall::kGetVariables, [&] { return binding_->Get(factory_.outputs, values); });
 }
 
-bool Instance::SetPoint(double time_s, std::span<const double> states) {
+bool Instance::SetPoint(double time_s, std::span<const double> states, const double* inputs) {
   time_s_ = time_s;
-  return Do(FmuCall::kDerivatives, [&] { return binding_->SetTime(time_s); }) &&
-         (states.empty() || Do(FmuCall::kDerivatives, [&] { return binding_->SetStates(states); }));
+  return Do(FmuCall::kSetVariables, [&] {
+    int status = binding_->SetTime(time_s);
+    if (IsGood(status) && !states.empty()) status = binding_->SetStates(states);
+    if (IsGood(status) && !factory_.inputs.empty()) status = Pass(inputs);
+    return status;
+  });
 }
 
 bool Instance::GetStates(std::span<double> states) {

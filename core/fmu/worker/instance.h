@@ -22,6 +22,9 @@ class Instance;
 struct InstanceFactory {
   FmuInterface interface;
   std::vector<FmuVariable> parameters, inputs, outputs;
+  // For Model Exchange: the continuous states that the outputs are, if each of them is one. They
+  // are known to the integrator, so that the FMU need not be called for them.
+  std::vector<int> states_of_outputs;
   double relative_tolerance = 0;
   FmuLibrary* library = nullptr;
   Monitor* monitor = nullptr;
@@ -57,7 +60,8 @@ class Instance {
 
   // Functions for Model Exchange. The next event time is +∞ if there is none.
   double next_event_s() const { return next_event_s_; }
-  bool SetPoint(double time_s, std::span<const double> states);
+  // Sets the time, the states and the inputs.
+  bool SetPoint(double time_s, std::span<const double> states, const double* inputs);
   bool GetStates(std::span<double> states);
   bool GetNominals(std::span<double> nominals);
   bool GetDerivatives(std::span<double> derivatives);
@@ -80,12 +84,15 @@ class Instance {
   bool Initialize(std::span<const double> parameters, std::span<const double> inputs);
   bool IterateEvents();
   bool Fail(int status, const std::string& what);
+  // Passes the inputs to the FMU unless it has these already. Returns its status.
+  int Pass(const double* inputs);
   template <class Call>
   bool Do(FmuCall kind, Call call);
 
   InstanceFactory& factory_;
   const int point_;
   double time_s_ = 0;
+  std::vector<double> inputs_;  // those passed last, empty where there may be others
   double next_event_s_;
   std::string failure_;
   int failure_status_ = 0;

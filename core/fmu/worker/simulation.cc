@@ -18,6 +18,17 @@ Matrix MiddleRows(const Matrix& matrix, int first, int points) {
   return matrix.size() == 0 ? Matrix() : Matrix(matrix.middleRows(first, points));
 }
 
+// Returns the states that all outputs are, or nothing if an output is none.
+std::vector<int> StatesOf(const StartMessage& start) {
+  if (start.interface.kind != FmuKind::kModelExchange) return {};
+  std::vector<int> states;
+  for (const FmuVariable& output : start.outputs) {
+    if (output.state == FmuVariable::kNoState) return {};
+    states.push_back(output.state);
+  }
+  return states;
+}
+
 absl::Status CheckInstances(const FmuInterface& interface, Eigen::Index points) {
   if (!interface.once_per_process || interface.can_save_state || points == 1) {
     return absl::OkStatus();
@@ -55,6 +66,7 @@ Simulation::Simulation(StartMessage start, InputSignals signals,
   factory_.parameters = start_.parameters;
   factory_.inputs = start_.inputs;
   factory_.outputs = start_.outputs;
+  factory_.states_of_outputs = StatesOf(start_);
   factory_.relative_tolerance = start_.integration.relative_tolerance;
   factory_.library = library_.get();
   factory_.monitor = monitor;

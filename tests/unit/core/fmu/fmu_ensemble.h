@@ -85,8 +85,10 @@ struct FmuEnsemble {
 // is not stepped exactly, and no step is longer than the interval between two samples.
 class UnknownEquations final : public StateSpaceModel {
  public:
-  explicit UnknownEquations(std::shared_ptr<const Model> model)
-      : owner_(std::move(model)), model_(dynamic_cast<const StateSpaceModel&>(*owner_)) {}
+  explicit UnknownEquations(std::shared_ptr<const Model> model, bool uses_time = true)
+      : owner_(std::move(model)),
+        model_(dynamic_cast<const StateSpaceModel&>(*owner_)),
+        uses_time_(uses_time) {}
   const ModelDescription& description() const override { return model_.description(); }
   void InitialStates(const ConstBlock& parameters, Block states) const override {
     model_.InitialStates(parameters, states);
@@ -99,10 +101,12 @@ class UnknownEquations final : public StateSpaceModel {
                const ConstBlock& inputs, Block outputs) const override {
     model_.Outputs(time_s, states, parameters, inputs, outputs);
   }
+  bool uses_time() const override { return uses_time_; }
 
  private:
   std::shared_ptr<const Model> owner_;
   const StateSpaceModel& model_;
+  const bool uses_time_;
 };
 
 }  // namespace polyest::internal

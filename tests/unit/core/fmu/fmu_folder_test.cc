@@ -10,6 +10,7 @@
 
 #include <fstream>
 
+#include "core/common/check.h"
 #include "core/fmu/archive.h"
 #include "core/fmu/fmu_description.h"
 #include "tests/unit/core/fmu/fmu_ensemble.h"
@@ -235,6 +236,51 @@ TEST_F(FmuFolder, TakesFloat32AndStartValuesOfStates) {
   EXPECT_THAT(Names(fmu->model.states), ElementsAre("x"));
   EXPECT_THAT(Names(fmu->model.outputs), ElementsAre("x"));
   EXPECT_THAT(fmu->model.equations, HasSubstr("keep their start values: i"));
+}
+
+// Returns whether an FMU's derivatives may depend on the time. `time` declares it, `dependencies`
+// is an attribute of the only derivative.
+bool UsesTime2(const std::string& time, const std::string& dependencies) {
+  const absl::StatusOr<FmuDescription> fmu = ParseFmuDescription(
+      "m", Xml("fmiVersion=\"2.0\" guid=\"t\" modelName=\"m\"",
+               "<ModelExchange modelIdentifier=\"m\"/><ModelVariables>"
+               "<ScalarVariable name=\"x\" valueReference=\"7\"><Real/></ScalarVariable>"
+               "<ScalarVariable name=\"dx\" valueReference=\"8\"><Real derivative=\"1\"/>"
+               "</ScalarVariable>" +
+                   time + "</ModelVariables><ModelStructure><Derivatives><Unknown index=\"2\"" +
+                   dependencies + "/></Derivatives></ModelStructure>"));
+  POLYEST_CHECK(fmu.ok());
+  return fmu->interface.derivatives_use_time;
+}
+bool UsesTime3(const std::string& time, const std::string& dependencies) {
+  const absl::StatusOr<FmuDescription> fmu = ParseFmuDescription(
+      "m", Xml("fmiVersion=\"3.0\" instantiationToken=\"t\" modelName=\"m\"",
+               "<ModelExchange modelIdentifier=\"m\"/><ModelVariables>"
+               "<Float64 name=\"x\" valueReference=\"7\"/>"
+               "<Float64 name=\"dx\" valueReference=\"8\" derivative=\"7\"/>" +
+                   time +
+                   "</ModelVariables><ModelStructure><ContinuousStateDerivative "
+                   "valueReference=\"8\"" +
+                   dependencies + "/></ModelStructure>"));
+  POLYEST_CHECK(fmu.ok());
+  return fmu->interface.derivatives_use_time;
+}
+
+TEST_F(FmuFolder, SaysWhetherDerivativesMayDependOnTheTime) {
+  const std::string time2 =
+      "<ScalarVariable name=\"t\" valueReference=\"9\" causality=\"independent\"><Real/>"
+      "</ScalarVariable>";  // the third variable
+  EXPECT_FALSE(UsesTime2(time2, " dependencies=\"1\""));
+  EXPECT_FALSE(UsesTime2(time2, " dependencies=\"\""));
+  EXPECT_TRUE(UsesTime2(time2, " dependencies=\"1 3\""));
+  EXPECT_TRUE(UsesTime2(time2, ""));
+  EXPECT_TRUE(UsesTime2("", " dependencies=\"1\""));
+  const std::string time3 = "<Float64 name=\"t\" valueReference=\"9\" causality=\"independent\"/>";
+  EXPECT_FALSE(UsesTime3(time3, " dependencies=\"7\""));
+  EXPECT_FALSE(UsesTime3(time3, " dependencies=\"\""));
+  EXPECT_TRUE(UsesTime3(time3, " dependencies=\"7\n9\""));
+  EXPECT_TRUE(UsesTime3(time3, ""));
+  EXPECT_TRUE(UsesTime3("", " dependencies=\"7\""));
 }
 
 }  // namespace

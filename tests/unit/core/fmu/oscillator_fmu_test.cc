@@ -4,24 +4,26 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <numbers>
 #include <string>
 
+#include "core/fmu/worker_ensemble.h"
 #include "tests/unit/core/fmu/fmu_ensemble.h"
 
 namespace polyest::internal {
 namespace {
 
-// The 70 points make two blocks, the second not full.
-constexpr int kPoints = 70;
+constexpr int kBlock = WorkerEnsemble::kPointsOfBlock;
+constexpr int kPoints = 4 * kBlock + 6;  // five blocks, the last not full
 
-FmuEnsemble Oscillators(std::shared_ptr<const Model> model) {
-  FmuEnsemble ensemble(std::move(model), kPoints, {"x", "v", "a"});
-  for (int point = 0; point < kPoints; ++point) {
-    const double part = point / static_cast<double>(kPoints);
+FmuEnsemble Oscillators(std::shared_ptr<const Model> model, int points = kPoints) {
+  FmuEnsemble ensemble(std::move(model), points, {"x", "v", "a"});
+  for (int point = 0; point < points; ++point) {
+    const double part = point / static_cast<double>(points);
     ensemble.Set("m", point, 0.8 + 0.4 * part);
     ensemble.Set("k", point, 30 + 20 * std::fmod(7 * part, 1));
     ensemble.Set("c", point, 0.1 + 0.3 * std::fmod(3 * part, 1));
@@ -31,43 +33,67 @@ FmuEnsemble Oscillators(std::shared_ptr<const Model> model) {
   return ensemble;
 }
 
-FmuEnsemble BuiltIn() {
-  FmuEnsemble ensemble =
-      Oscillators(std::make_shared<UnknownEquations>(*FindBuiltinModel("mass_spring_damper")));
+// With `uses_time`, no step is longer than the interval between two samples.
+FmuEnsemble BuiltIn(int points = kPoints, bool uses_time = true) {
+  FmuEnsemble ensemble = Oscillators(
+      std::make_shared<UnknownEquations>(*FindBuiltinModel("mass_spring_damper"), uses_time),
+      points);
   ensemble.specification.integration.method = IntegrationMethod::kExplicit;
   return ensemble;
 }
-FmuEnsemble Fmu(const char* name) { return Oscillators(*TestFmus().Find(name)); }
+FmuEnsemble Fmu(const char* name, int points = kPoints) {
+  return Oscillators(*TestFmus().Find(name), points);
+}
 
-class ModelExchangeOscillator : public testing::TestWithParam<const char*> {};
+// Propagates the built-in model in blocks of the size that FMUs are propagated in: the points of a
+// block have common steps.
+Matrix PropagateInBlocks(const FmuEnsemble& all, const std::vector<double>& times_s) {
+  Matrix outputs(all.points(), std::ssize(times_s) * std::ssize(all.specification.outputs));
+  for (int first = 0; first < all.points(); first += kBlock) {
+    const int count = std::min(kBlock, all.points() - first);
+    FmuEnsemble block = all;
+    EnsembleSpecification& specification = block.specification;
+    specification.parameters = all.specification.parameters.middleRows(first, count);
+    specification.amplitudes = all.specification.amplitudes.middleRows(first, count);
+    outputs.middleRows(first, count) = block.Propagate(times_s);
+  }
+  return outputs;
+}
+
+struct ExchangeCase {
+  const char* fmu;
+  bool uses_time;  // whether its derivatives may depend on the time, by its description
+};
+
+class ModelExchangeOscillator : public testing::TestWithParam<ExchangeCase> {};
 
 TEST_P(ModelExchangeOscillator, FollowsTheBuiltInToRoundingErrors) {
-  FmuEnsemble fmu = Fmu(GetParam());
-  FmuEnsemble built_in = BuiltIn();
+  FmuEnsemble fmu = Fmu(GetParam().fmu);
+  FmuEnsemble built_in = BuiltIn(kPoints, GetParam().uses_time);
   fmu.Drive("force", SinusoidInput{.frequency_hz = 0.7}, 2);
   built_in.Drive("force", SinusoidInput{.frequency_hz = 0.7}, 2);
   const std::vector<double> times_s = TimesUntil(5, 0.05);
-  const Matrix difference = fmu.Propagate(times_s) - built_in.Propagate(times_s);
+  const Matrix difference = fmu.Propagate(times_s) - PropagateInBlocks(built_in, times_s);
   // The same integrator takes the same steps. Rounding errors of 1e-16 grow over some 1000 steps,
   // and accelerations are up to 60.
   EXPECT_LT(difference.cwiseAbs().maxCoeff(), 60 * 1e-12);
 }
 
 TEST_P(ModelExchangeOscillator, JumpsWithItsInput) {
-  FmuEnsemble fmu = Fmu(GetParam());
-  FmuEnsemble built_in = BuiltIn();
+  FmuEnsemble fmu = Fmu(GetParam().fmu);
+  FmuEnsemble built_in = BuiltIn(kPoints, GetParam().uses_time);
   fmu.Drive("force", StepInput{.time_s = 0.33}, 5);
   built_in.Drive("force", StepInput{.time_s = 0.33}, 5);
   const std::vector<double> times_s = TimesUntil(1, 0.1);
-  const Matrix difference = fmu.Propagate(times_s) - built_in.Propagate(times_s);
+  const Matrix difference = fmu.Propagate(times_s) - PropagateInBlocks(built_in, times_s);
   EXPECT_LT(difference.cwiseAbs().maxCoeff(), 60 * 1e-12);
 }
 
 TEST_P(ModelExchangeOscillator, IsSeenLateThroughDelays) {
-  FmuEnsemble fmu = Fmu(GetParam());
-  FmuEnsemble built_in = BuiltIn();
+  FmuEnsemble fmu = Fmu(GetParam().fmu, kBlock);
+  FmuEnsemble built_in = BuiltIn(kBlock, GetParam().uses_time);
   for (FmuEnsemble* ensemble : {&fmu, &built_in}) {
-    ensemble->specification.output_delays_s.setZero(kPoints, 3);
+    ensemble->specification.output_delays_s.setZero(kBlock, 3);
     ensemble->specification.output_delays_s.col(0).setLinSpaced(0, 0.1);
     ensemble->specification.output_delays_s.col(2).setConstant(-0.02);
   }
@@ -77,8 +103,25 @@ TEST_P(ModelExchangeOscillator, IsSeenLateThroughDelays) {
   EXPECT_LT(difference.cwiseAbs().maxCoeff(), 60 * 1e-11);
 }
 
+// Where all outputs are continuous states, the FMU is not called for them.
+TEST_P(ModelExchangeOscillator, HasTheSameStatesWhateverElseIsRead) {
+  FmuEnsemble states = Fmu(GetParam().fmu);
+  FmuEnsemble all = Fmu(GetParam().fmu);
+  states.specification.outputs = {*states.Description().FindOutput("v"),
+                                  *states.Description().FindOutput("x")};
+  all.specification.outputs = {states.specification.outputs[0], states.specification.outputs[1],
+                               *all.Description().FindOutput("a")};
+  const std::vector<double> times_s = TimesUntil(1, 0.1);
+  const Matrix of_states = states.Propagate(times_s);
+  const Matrix of_all = all.Propagate(times_s);
+  for (Eigen::Index k = 0; k < std::ssize(times_s); ++k) {
+    EXPECT_EQ(of_states.middleCols(2 * k, 2), of_all.middleCols(3 * k, 2)) << times_s[k];
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Versions, ModelExchangeOscillator,
-                         testing::Values("oscillator_me2", "oscillator_me3"));
+                         testing::Values(ExchangeCase{"oscillator_me2", true},
+                                         ExchangeCase{"oscillator_me3", false}));
 
 class CoSimulationOscillator : public testing::TestWithParam<const char*> {};
 
