@@ -2,6 +2,7 @@
 
 #include <absl/strings/str_cat.h>
 
+#include <algorithm>
 #include <limits>
 #include <numeric>
 #include <utility>
@@ -13,6 +14,13 @@ std::vector<Quantity> Numbered(size_t count) {
   std::vector<Quantity> quantities(count);
   for (size_t i = 0; i < count; ++i) quantities[i].name = absl::StrCat(i);
   return quantities;
+}
+
+// Returns the first elements of a buffer, which grows to hold them.
+std::span<double> SpanOf(std::vector<double>& buffer, Eigen::Index count) {
+  const auto size = static_cast<size_t>(count);
+  if (buffer.size() < size) buffer.resize(size);
+  return std::span(buffer).first(size);
 }
 
 }  // namespace
@@ -34,15 +42,19 @@ template <class Read>
 void ExchangeModel::ForEachRow(double time_s, const ConstBlock& states,
                                const ConstBlock& parameters, const ConstBlock& inputs,
                                Block results, Read read) const {
-  Vector x(states.cols()), u(inputs.cols()), result(results.cols());
-  const std::span<double> point(x.data(), static_cast<size_t>(x.size()));
+  const std::span<double> x = SpanOf(states_, states.cols());
+  const std::span<double> u = SpanOf(inputs_, inputs.cols());
+  const std::span<double> result = SpanOf(result_, results.cols());
   for (Eigen::Index row = 0; row < parameters.rows(); ++row) {
     Instance& instance = *instances_[static_cast<size_t>(parameters(row, 0))];
-    if (states.cols() > 0) x = states.row(row).matrix();
-    if (inputs.cols() > 0) u = inputs.row(row).matrix();
-    const bool good = instance.SetPoint(time_s, point, u.data()) && read(instance, result);
-    if (!good) result.setConstant(std::numeric_limits<double>::quiet_NaN());
-    results.row(row) = result.array();
+    for (size_t i = 0; i < x.size(); ++i) x[i] = states(row, static_cast<Eigen::Index>(i));
+    for (size_t i = 0; i < u.size(); ++i) u[i] = inputs(row, static_cast<Eigen::Index>(i));
+    if (!(instance.SetPoint(time_s, x, u.data()) && read(instance, result))) {
+      std::ranges::fill(result, std::numeric_limits<double>::quiet_NaN());
+    }
+    for (size_t i = 0; i < result.size(); ++i) {
+      results(row, static_cast<Eigen::Index>(i)) = result[i];
+    }
   }
 }
 
@@ -59,18 +71,18 @@ void ExchangeModel::InitialStates(const ConstBlock& parameters, Block states) co
 void ExchangeModel::Derivatives(double time_s, const ConstBlock& states,
                                 const ConstBlock& parameters, const ConstBlock& inputs,
                                 Block derivatives) const {
-  ForEachRow(time_s, states, parameters, inputs, derivatives,
-             [](Instance& instance, Vector& result) {
-               return instance.GetDerivatives({result.data(), static_cast<size_t>(result.size())});
-             });
+  ForEachRow(
+      time_s, states, parameters, inputs, derivatives,
+      [](Instance& instance, std::span<double> result) { return instance.GetDerivatives(result); });
 }
 
 void ExchangeModel::Outputs(double time_s, const ConstBlock& states, const ConstBlock& parameters,
                             const ConstBlock& inputs, Block outputs) const {
   if (states_of_outputs_.empty()) {
-    ForEachRow(time_s, states, parameters, inputs, outputs, [](Instance& instance, Vector& result) {
-      return instance.GetOutputs(result.data());
-    });
+    ForEachRow(time_s, states, parameters, inputs, outputs,
+               [](Instance& instance, std::span<double> result) {
+                 return instance.GetOutputs(result.data());
+               });
   }
   for (size_t i = 0; i < states_of_outputs_.size(); ++i) {
     outputs.col(static_cast<Eigen::Index>(i)) = states.col(states_of_outputs_[i]);
