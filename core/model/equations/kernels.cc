@@ -30,7 +30,8 @@ void ForRows(double* result, Eigen::Index rows, const Function& function) {
 
 // Applies an operation to as many of the operands as it has.
 template <Operation operation>
-Lane ApplyAt(Eigen::Index row, const Operand& a, const Operand& b, const Operand& c) {
+[[gnu::always_inline]] inline Lane ApplyAt(Eigen::Index row, const Operand& a, const Operand& b,
+                                           const Operand& c) {
   using Function = LaneFunction<operation>;
   if constexpr (Operands(operation) == 1) {
     return Function::Apply(a.At(row));
@@ -50,7 +51,7 @@ void Single(const Instruction& instruction, double* const* slots, Eigen::Index r
 
 // Applies an operation; `inner` is its operand at the position, x and y are the others in order.
 template <Operation operation, int kPosition>
-Lane ApplyWith(const Lane& inner, const Lane& x, const Lane& y) {
+[[gnu::always_inline]] inline Lane ApplyWith(const Lane& inner, const Lane& x, const Lane& y) {
   using Function = LaneFunction<operation>;
   if constexpr (Operands(operation) == 2) {
     return kPosition == 0 ? Function::Apply(inner, x) : Function::Apply(x, inner);

@@ -37,6 +37,8 @@ class Program {
   static constexpr int kNone = -2;  // no block
 
   Program() = default;
+  Program(Program&&) = default;
+  Program& operator=(Program&&) = default;
   // Compiles a program that writes the value of roots[i] into column i of the results. places[i]
   // says where variable i is stored; `parameters` is the index of the block that changes seldom
   // from run to run, or kNone. The tables must outlive the program.
@@ -64,9 +66,14 @@ class Program {
     VariablePlace place;
   };
 
-  // Lets the slots of what is kept of the parameters point to values for these rows.
-  void UseParameters(const ConstBlock& parameters, Eigen::Index row, Eigen::Index rows,
-                     double** slots) const;
+  struct Prepared;
+  struct OfThread;
+
+  // Returns what this thread keeps for these rows, with the slots of all but loads and results.
+  Prepared& Prepare(Eigen::Index row, Eigen::Index rows) const;
+  void SetUp(OfThread& of_thread, Eigen::Index row, Eigen::Index rows, Prepared& place) const;
+  // Computes what is kept of the parameters, unless they are those of the last run.
+  void UseParameters(const ConstBlock& parameters, Prepared& place) const;
 
   std::vector<Instruction> of_time_;  // each has a slot of one value of its own
   std::vector<Instruction> of_parameters_;
@@ -74,15 +81,15 @@ class Program {
   std::vector<Load> loads_;
   std::vector<Lane> constants_;
   std::vector<Eigen::Index> zero_;  // columns of the results that are always 0
-  std::int64_t id_ = 0;             // which only copies of a program share
+  std::int64_t id_ = 0;             // which no other program has
   int parameters_ = kNone;
   std::vector<Eigen::Index> parameter_columns_;  // those that of_parameters_ reads
   // Order of the slots: the time, the constants, the results of of_time_, what is kept of those of
   // of_parameters_, the loads, the columns of the results, the registers.
-  std::uint32_t first_kept_ = 0;
+  std::uint32_t first_kept_ = 1;
   std::uint32_t kept_ = 0;
-  std::uint32_t first_result_ = 0;
-  std::uint32_t first_register_ = 0;
+  std::uint32_t first_result_ = 1;
+  std::uint32_t first_register_ = 1;
   int registers_ = 0;
 };
 
