@@ -54,7 +54,7 @@ std::string Use(const DataColumn& column) {
   if (converts) {
     units = absl::StrCat(", ", column.unit, " → ", column.model_unit);
   } else if (column.is_channel() && !column.unit.empty() && column.model_unit.empty()) {
-    units = absl::StrCat(" in ", column.unit, ", for which the model has no unit");
+    units = absl::StrCat(" in ", column.unit, ", not converted");
   }
   if (!renamed && units.empty()) return "";
   const std::string header = InQuotes(column.name.header);

@@ -180,10 +180,10 @@ absl::Status RowParser::ParseWritten(const DataColumn& column, absl::string_view
     default:
       break;
   }
-  if (column.role == DataColumn::kTime && number.kind != NumberCell::kTwoReadings &&
-      text.find_first_of(":/-.") != text.npos) {
-    DateOrder order = DateOrder::kDayFirst;
-    if (ReadClockTime(text, order).kind != ClockTime::kNone) {
+  if (column.role == DataColumn::kTime && number.kind != NumberCell::kTwoReadings) {
+    DateOrder order = DateOrder::kUnknown;
+    const bool is_time = ReadClockTime(text, order).kind != ClockTime::kNone;
+    if (is_time || number.kind == NumberCell::kNoNumber) {
       time_cell_ = StripCell(cell);
       return ParseTime(column, text);
     }
@@ -297,7 +297,7 @@ absl::Status RowParser::NumberError(const DataColumn& column, absl::string_view 
       return CellError(
           column, absl::StrCat(cell, " must be a number with a decimal ", point ? "point" : "comma",
                                style_.named     ? ", as --decimal says"
-                               : decimal_known_ ? ", as the numbers before it are"
+                               : decimal_known_ ? ", as other numbers of the file are"
                                                 : "",
                                "; --decimal ", point ? "comma" : "point", " reads it"));
     default:

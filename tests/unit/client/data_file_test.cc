@@ -131,7 +131,9 @@ TEST(DataReader, RefusesTextAndSaysWhere) {
   EXPECT_EQ(ErrorOf("t,x\n0,1.5m\n"), "data.csv:2: column x: \"1.5m\" must be a number");
   EXPECT_EQ(ErrorOf("t,x\n0,1 2\n"), "data.csv:2: column x: \"1 2\" must be a number");
   EXPECT_EQ(ErrorOf("t,x\n0,+-1\n"), "data.csv:2: column x: \"+-1\" must be a number");
-  EXPECT_EQ(ErrorOf("t,x\nx,1\n"), "data.csv:2: column t: \"x\" must be a number");
+  EXPECT_EQ(ErrorOf("t,x\nx,1\n"),
+            "data.csv:2: column t: \"x\" must be a number, or a time such as "
+            "2026-01-31T13:00:00.5 or 13:00:00.5");
   EXPECT_THAT(ErrorOf("t,x\n0,1e999\n"), HasSubstr("\"1e999\" is out of the range of a double"));
 }
 
