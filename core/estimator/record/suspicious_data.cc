@@ -98,7 +98,7 @@ class Warnings {
     AddLateStart();
     int64_t samples = 0;
     for (size_t i = 0; i < columns_.size(); ++i) {
-      AddConstant(NameOf(i), columns_[i], i < channels);
+      AddConstant(i, columns_[i]);
       if (i >= channels) continue;
       samples += columns_[i].samples;
       AddFaults(i);
@@ -181,14 +181,25 @@ class Warnings {
         intervals_.latest_first_s(), InitialState());
   }
 
-  void AddConstant(const std::string& name, const ColumnFacts& column, bool measured) {
-    if (column.samples == 0 && measured) {
-      Add("%s is measured, but the data have no sample of it%s", name,
-          problem_.gate() == nullptr ? "" : " in rows for which useWhen holds");
-    }
+  void AddConstant(size_t place, const ColumnFacts& column) {
+    const std::string& name = NameOf(place);
+    if (column.samples == 0 && place < static_cast<size_t>(problem_.channels())) AddNoSample(place);
     if (column.samples >= kMinConstant && column.smallest == column.largest) {
       Add("%s never changes: it is %g in every row; is the sensor connected?", name,
           column.smallest);
+    }
+  }
+
+  void AddNoSample(size_t channel) {
+    const std::string& output = NameOf(channel);
+    const double from_s = problem_.used_from_s()[channel];
+    const char* const gate = problem_.gate() == nullptr ? "" : " in rows for which useWhen holds";
+    if (from_s > 0) {
+      Add("%s is measured, but the data have no sample of it%s after t = %g s, the largest delay "
+          "that its prior allows, before which samples are not used",
+          output, gate, from_s);
+    } else {
+      Add("%s is measured, but the data have no sample of it%s", output, gate);
     }
   }
 

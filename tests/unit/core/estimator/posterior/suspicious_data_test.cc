@@ -103,6 +103,14 @@ TEST(SuspiciousData, AreGapsOfAStreamedInputOnly) {
   EXPECT_THAT(WarningsOf(VelocityProblem(), InitialVelocityRecord(times, 1.1, 0.01)), IsEmpty());
 }
 
+TEST(SuspiciousData, AreNoSamplesAfterTheLargestDelayThatThePriorAllows) {
+  Problem problem = VelocityProblem();
+  problem.uncertain.push_back(UncertainParameter::Uniform("x.delay", 0, 5).value());
+  EXPECT_THAT(WarningsOf(problem, InitialVelocityRecord(TimesFrom(0.05, 60), 1.1, 0.01)),
+              Contains(AllOf(HasSubstr("x is measured, but the data have no sample of it"),
+                             HasSubstr("after t = 5 s, the largest delay"))));
+}
+
 TEST(SuspiciousData, AreSamplesInAnotherUnit) {
   const Problem problem = TextProblem("a + b*t/10",
                                       {UncertainParameter::Normal("a", 1, 0.3).value(),
