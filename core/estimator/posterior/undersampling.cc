@@ -22,6 +22,11 @@ constexpr double kSwing = 4;
 constexpr double kUneven = 0.05;
 // By how many prior standard deviations parameters are moved to find other responses.
 constexpr double kMoved = 2;
+// Turning points between two samples from which on a response is said to have images: with four
+// samples a period, or with two where there are so few parameters that all minima are searched.
+constexpr double kRare = 0.5, kRareIfSearched = 1;
+constexpr int kMostSearched = 3;
+constexpr double kInexact = 0.1;  // of a number of turning points between two samples
 
 struct Times {
   std::vector<double> time_s;  // every phase of every interval; the first begins at t = 0
@@ -177,17 +182,18 @@ double TurnsBetweenSamples(const Vector& outputs, const std::vector<int>& rows, 
   return static_cast<double>(turns) / static_cast<double>(until);
 }
 
-// A channel whose response turns more than once between two samples.
+// A channel whose response turns so often that others have the same samples.
 struct Aliased {
   int channel = 0;
   double turns = 0;
 };
 
-// Returns the channel that turns the least of all that turn in a run, unless it turns once between
-// two samples at most or these are uneven.
+// Returns the channel that turns the least of all that turn in a run, unless it turns so seldom
+// that it has no images or the samples are uneven.
 std::optional<Aliased> AliasedChannel(const Findings& findings, const Matrix& outputs) {
   const RowBlock& beginning = findings.record->beginning();
   const int m = findings.problem->channels();
+  const double rare = findings.problem->dimension() > kMostSearched ? kRare : kRareIfSearched;
   std::optional<Aliased> least;
   for (int c = 0; c < m; ++c) {
     const std::vector<int> rows = RowsOf(beginning, m, c);
@@ -197,15 +203,29 @@ std::optional<Aliased> AliasedChannel(const Findings& findings, const Matrix& ou
     const double turns =
         TurnsBetweenSamples(channel, rows, kSwing * Deviation(findings, c, largest, largest));
     if (turns == 0) continue;
-    if (turns <= 1 || !AreEven(beginning, rows)) return std::nullopt;
+    if (turns < rare || !AreEven(beginning, rows)) return std::nullopt;
     if (!least || turns < least->turns) least = Aliased{c, turns};
   }
   return least;
 }
 
-// Whether a channel turns less or more often, by one turn at least, where the parameters are moved
-// within the prior.
-bool PriorAllowsOtherTurns(const Findings& findings, const Times& times, const Aliased& aliased) {
+// Whether there is an image of a response with `turns` turning points between two samples from it
+// to one with `others`. A vibration of frequency f turns 2 f Δt times, and those of f and
+// n/Δt ± f have the same samples at intervals Δt.
+bool PassesAnImage(double turns, double others) {
+  const double low = std::min(turns, others) - kInexact, high = std::max(turns, others) + kInexact;
+  for (double n = 0; 2 * n - turns <= high; ++n) {
+    for (const double image : {2 * n - turns, 2 * n + turns}) {
+      const bool is_itself = std::abs(image - turns) < 1e-9;
+      if (!is_itself && image > 0 && image >= low && image <= high) return true;
+    }
+  }
+  return false;
+}
+
+// Whether a channel's response passes one of its images where the parameters are moved within the
+// prior.
+bool PriorAllowsAnImage(const Findings& findings, const Times& times, const Aliased& aliased) {
   const Prior& prior = findings.problem->prior();
   const int n = prior.dimension(), m = findings.problem->channels();
   Matrix thetas(2 * n, n);
@@ -221,7 +241,7 @@ bool PriorAllowsOtherTurns(const Findings& findings, const Times& times, const A
     const double largest = channel.cwiseAbs().maxCoeff();
     const double least = kSwing * Deviation(findings, aliased.channel, largest, largest);
     const double turns = TurnsBetweenSamples(channel, rows, least);
-    if (turns > 0 && std::abs(turns - aliased.turns) >= 1) return true;
+    if (turns > 0 && PassesAnImage(aliased.turns, turns)) return true;
   }
   return false;
 }
@@ -239,7 +259,7 @@ void AddAliasing(const Findings& findings, const Estimate& estimate,
   const std::optional<Matrix> outputs = RunAt(*findings.problem, theta.transpose(), times.time_s);
   if (!outputs) return;
   const auto aliased = AliasedChannel(findings, *outputs);
-  if (!aliased || !PriorAllowsOtherTurns(findings, times, *aliased)) return;
+  if (!aliased || !PriorAllowsAnImage(findings, times, *aliased)) return;
   const auto channel = static_cast<size_t>(aliased->channel);
   diagnostics.push_back(
       {DiagnosticCode::kUndersampled,

@@ -18,11 +18,12 @@
 namespace polyest::internal {
 
 // Appends UNDERSAMPLED for each parameter that is not identified and that samples at other times
-// would identify. Appends it, too, if the response at an estimate that tells of the data has more
-// than one turning point between two evenly spaced samples, and another number for other values
-// that the prior allows; this is not examined for models that simulate themselves. The model runs
-// over the beginning of the record. Appends nothing if it cannot be run there, or for a problem
-// with streamed inputs, which are not known between rows.
+// would identify. Appends it, too, if an estimate that tells of the data has a response of which
+// evenly spaced samples are rare (half a turning point or more between two of them; one or more
+// with up to three parameters), and the prior allows values with which a vibration of another
+// frequency has the same samples; this is not examined for models that simulate themselves. The
+// model runs over the beginning of the record. Appends nothing if it cannot be run there, or for a
+// problem with streamed inputs, which are not known between rows.
 void AddUndersampling(const Findings& findings, const Estimate& estimate,
                       std::vector<Diagnostic>& diagnostics);
 

@@ -56,5 +56,39 @@ TEST(Aliasing, IsNotWhereThePriorExcludesOtherFrequencies) {
   EXPECT_FALSE(Has(VibrationAt(Even, 19.5, 20.5), DiagnosticCode::kUndersampled));
 }
 
+// A decaying vibration of 8.17 rad/s with four unknowns. At 4 samples a second its image has 16.96
+// rad/s, and the cost has two minima of about the same value.
+Estimate RareVibration(double interval_s) {
+  const Problem problem = TextProblem(
+      "(a*cos(w*t) + b*sin(w*t))*exp(-d*t)",
+      {*UncertainParameter::Uniform("w", 4.5, 28), *UncertainParameter::Normal("a", 0, 1),
+       *UncertainParameter::Normal("b", 0, 1), *UncertainParameter::Uniform("d", 0, 0.5)},
+      kNoise);
+  Samples samples;
+  std::vector<double> values;
+  for (int k = 1; k <= 30; ++k) {
+    const double t = interval_s * k;
+    samples.time_s.push_back(t);
+    values.push_back((0.6 * std::cos(8.17 * t) - 0.7 * std::sin(8.17 * t)) * std::exp(-0.1 * t) +
+                     kNoise * std::sin(17 * k));
+  }
+  samples.columns = {{"y", values, {}}};
+  return EstimateOf(problem, samples);
+}
+
+TEST(Aliasing, IsPossibleBelowTwoSamplesAPeriodAndAbove) {
+  const Estimate estimate = RareVibration(0.25);
+  const double w = estimate.parameters[0].map;
+  EXPECT_TRUE(std::abs(w - 8.17) < 0.1 || std::abs(w - 16.96) < 0.1 ||
+              estimate.parameters[0].verdict == Verdict::kNotIdentified)
+      << w;
+  EXPECT_TRUE(Has(estimate, DiagnosticCode::kUndersampled) ||
+              Has(estimate, DiagnosticCode::kMultipleMinima));
+}
+
+TEST(Aliasing, IsNotWithEightSamplesAPeriod) {
+  EXPECT_FALSE(Has(RareVibration(0.1), DiagnosticCode::kUndersampled));
+}
+
 }  // namespace
 }  // namespace polyest::internal
