@@ -48,6 +48,8 @@ std::string DiagnosticText(v1::Diagnostic::Code code) {
       return "windows disagree";
     case v1::Diagnostic::PRIOR_DATA_CONFLICT:
       return "prior and data in conflict";
+    case v1::Diagnostic::FIXED_VALUE_CONFLICT:
+      return "fixed value in conflict";
     default:
       return absl::StrCat("diagnostic ", static_cast<int>(code));
   }

@@ -24,6 +24,7 @@
 #include "core/estimator/studies/posterior_study.h"
 #include "core/estimator/studies/prediction.h"
 #include "core/estimator/studies/regularization_sweep.h"
+#include "core/estimator/studies/score_diagnosis.h"
 
 namespace polyest {
 
@@ -69,6 +70,7 @@ class Estimator::Implementation {
   absl::Status Process(const Stop& stop);
   absl::Status Restore(const EstimatorSnapshot& snapshot, const Stop& stop);
   absl::StatusOr<Estimate> CurrentEstimate(const Stop& stop) const;
+  absl::StatusOr<Estimate> TestedEstimate(const Stop& stop) const;
   absl::StatusOr<Posterior> CurrentPosterior(const PosteriorOptions& options,
                                              const Stop& stop) const;
   absl::StatusOr<CostProfiles> CurrentProfiles(const ProfileOptions& options,
@@ -183,6 +185,20 @@ absl::Status Estimator::Implementation::Restore(const EstimatorSnapshot& snapsho
 absl::StatusOr<Estimate> Estimator::Implementation::CurrentEstimate(const Stop& stop) const {
   POLYEST_ASSIGN_OR_RETURN(AssessedMixture assessed, mixture_->Assess(PosteriorEffort(), stop));
   return std::move(assessed.whole.estimate);
+}
+
+absl::StatusOr<Estimate> Estimator::Implementation::TestedEstimate(const Stop& stop) const {
+  POLYEST_ASSIGN_OR_RETURN(AssessedMixture assessed, mixture_->Assess(PosteriorEffort(), stop));
+  Estimate& estimate = assessed.whole.estimate;
+  if (IsWorthTesting(estimate)) {
+    const MixtureComponent& heaviest = mixture_->component(assessed.order.front());
+    POLYEST_ASSIGN_OR_RETURN(
+        const FixedValueTests tests,
+        TestFixedQuantities(estimated_problem(), *store_, rows_processed(),
+                            heaviest.expansion().noise().channels, estimate, stop));
+    AddScoreTests(tests, estimate);
+  }
+  return std::move(estimate);
 }
 
 absl::StatusOr<Posterior> Estimator::Implementation::CurrentPosterior(
@@ -320,6 +336,9 @@ absl::Status Estimator::Append(const Samples& samples) { return implementation_-
 absl::Status Estimator::Process(const Stop& stop) { return implementation_->Process(stop); }
 absl::StatusOr<Estimate> Estimator::CurrentEstimate(const Stop& stop) const {
   return implementation_->CurrentEstimate(stop);
+}
+absl::StatusOr<Estimate> Estimator::TestedEstimate(const Stop& stop) const {
+  return implementation_->TestedEstimate(stop);
 }
 absl::StatusOr<Posterior> Estimator::CurrentPosterior(const PosteriorOptions& options,
                                                       const Stop& stop) const {

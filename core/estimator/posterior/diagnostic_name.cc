@@ -38,6 +38,8 @@ const char* NameOf(DiagnosticCode code) {
       return "WINDOWS_DISAGREE";
     case DiagnosticCode::kPriorDataConflict:
       return "PRIOR_DATA_CONFLICT";
+    case DiagnosticCode::kFixedValueConflict:
+      return "FIXED_VALUE_CONFLICT";
   }
   return "";
 }

@@ -25,6 +25,7 @@ enum class DiagnosticCode {
   kReplayPostponed,              // max_replay_row_count has put off what the estimate needs
   kWindowsDisagree,              // windows of the record scatter by more than the noise explains
   kPriorDataConflict,            // what the data say is improbable by the prior
+  kFixedValueConflict,           // the residuals ask for another value of what is held fixed
 };
 
 // Returns the code's name in messages and files, such as "NOT_IDENTIFIED": that of the value of

@@ -55,6 +55,8 @@ v1::Diagnostic::Code ToProto(DiagnosticCode code) {
       return v1::Diagnostic::WINDOWS_DISAGREE;
     case DiagnosticCode::kPriorDataConflict:
       return v1::Diagnostic::PRIOR_DATA_CONFLICT;
+    case DiagnosticCode::kFixedValueConflict:
+      return v1::Diagnostic::FIXED_VALUE_CONFLICT;
   }
   POLYEST_CHECK(false);
 }

@@ -115,7 +115,7 @@ absl::StatusOr<v1::ComputeEstimateResponse> ComputeEstimate(
   POLYEST_RETURN_IF_ERROR(
       ProcessWithHistory(std::move(samples), points, *estimator, history, stop));
   if (points > 0) *response.mutable_history() = std::move(history);
-  POLYEST_ASSIGN_OR_RETURN(Estimate estimate, estimator->CurrentEstimate(stop));
+  POLYEST_ASSIGN_OR_RETURN(Estimate estimate, estimator->TestedEstimate(stop));
   *response.mutable_estimate() = ToProto(estimate);
   return response;
 }

@@ -92,6 +92,12 @@ const EXPLANATIONS: Record<string, Explanation> = {
     remedy: 'Check the unit and the prior. If both are right, the parameter makes up for something else that is wrong in the model.',
     severity: 'serious',
   },
+  FIXED_VALUE_CONFLICT: {
+    title: 'A fixed value is wrong',
+    meaning: 'The residuals ask for another value of something that the problem holds fixed: a parameter, an initial state, or a gain, a delay or an offset of a signal.',
+    remedy: 'Correct the value, or make it uncertain.',
+    severity: 'serious',
+  },
   MULTIPLE_MINIMA: {
     title: 'Several sets of values fit',
     meaning: 'Several separate sets of values fit the data. The estimate shown is that of the most probable one.',

@@ -186,7 +186,8 @@ TEST(EstimateToProto, KnowsEveryDiagnostic) {
       {DiagnosticCode::kInconsistentOverTime, v1::Diagnostic::INCONSISTENT_OVER_TIME},
       {DiagnosticCode::kReplayPostponed, v1::Diagnostic::REPLAY_POSTPONED},
       {DiagnosticCode::kWindowsDisagree, v1::Diagnostic::WINDOWS_DISAGREE},
-      {DiagnosticCode::kPriorDataConflict, v1::Diagnostic::PRIOR_DATA_CONFLICT}};
+      {DiagnosticCode::kPriorDataConflict, v1::Diagnostic::PRIOR_DATA_CONFLICT},
+      {DiagnosticCode::kFixedValueConflict, v1::Diagnostic::FIXED_VALUE_CONFLICT}};
   for (const auto& [code, expected] : codes) {
     Estimate estimate;
     estimate.diagnostics = {{code, "why"}};
