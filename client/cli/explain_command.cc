@@ -189,6 +189,12 @@ void PrintExplanation(const v1::Estimate& estimate, const std::vector<int>& open
   for (const int i : open) PrintSentence(out, Proposal(*design, i, estimate.parameters(i)));
 }
 
+bool HasFixedValueConflict(const v1::Estimate& estimate) {
+  return std::ranges::any_of(estimate.diagnostics(), [](const v1::Diagnostic& diagnostic) {
+    return diagnostic.code() == v1::Diagnostic::FIXED_VALUE_CONFLICT;
+  });
+}
+
 absl::Status Explain(const ExplainArguments& arguments, std::ostream& out) {
   auto backend = MakeBackend(arguments.place);
   POLYEST_ASSIGN_OR_RETURN(const ExplainInput input, ReadExplainInput(arguments, *backend));
@@ -204,6 +210,14 @@ absl::Status Explain(const ExplainArguments& arguments, std::ostream& out) {
   backend.reset();  // erases its progress line
   PrintExplanation(input.estimate, open, design, out);
   if (arguments.no_remedies || !CallsForRemedies(input.estimate)) return absl::OkStatus();
+  if (HasFixedValueConflict(input.estimate)) {
+    out << '\n';
+    PrintSentence(
+        out,
+        "Before any remedy below, correct what the problem holds fixed and the residuals "
+        "contradict, or make it uncertain, and explain again: noise and disturbances only "
+        "take up what a wrong value does.");
+  }
   out.flush();  // since remedies may take minutes
   backend = MakeBackend(arguments.place);
   const absl::StatusOr<RemedyTrial> trial = TryOnRecord(input, *backend);

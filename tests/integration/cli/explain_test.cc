@@ -210,6 +210,22 @@ TEST_F(RemediesTest, CorrelatedNoiseIsPreferredWhereTheSensorWanders) {
                     HasSubstr(R"("correlation":{"auto":true})")));
 }
 
+// The sensor's gain and the initial displacement do the same in free vibration.
+TEST_F(RemediesTest, ComeAfterAFixedValueThatIsWrong) {
+  std::ifstream in(Example("oscillator.csv"));
+  std::string line, record;
+  std::getline(in, line);
+  record = line + "\n";
+  for (int i = 0; i < 120 && std::getline(in, line); ++i) {
+    const size_t comma = line.find(',');
+    absl::StrAppend(&record, line.substr(0, comma), ",", 1.05 * std::stod(line.substr(comma + 1)),
+                    "\n");
+  }
+  EXPECT_THAT(Explain(PerfectOscillator(kReleased, kStiffness), File("record.csv", record)),
+              AllOf(HasSubstr("fixed value in conflict: the residuals ask for x"),
+                    HasSubstr(" = 1.05"), HasSubstr("Before any remedy below, correct what")));
+}
+
 TEST_F(RemediesTest, NoEvidenceIsNeededForARemedyThatLeavesNoContradiction) {
   const std::string white = R"({
     "model": {"builtin": "mass_spring_damper"}, "fixed": {"m": 1, "x0": 1},
