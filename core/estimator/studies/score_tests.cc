@@ -228,11 +228,12 @@ absl::StatusOr<Matrix> AdaptedGram(const ResidualPass& pass, int64_t rows, doubl
 
 // Moves the delays of outputs, which need no trajectories of their own, out of the quantities.
 std::vector<FixedQuantity> TakeOutputDelays(std::vector<FixedQuantity>& quantities) {
-  const auto late = std::ranges::stable_partition(quantities, [](const FixedQuantity& quantity) {
+  const auto is_other = [](const FixedQuantity& quantity) {
     return quantity.delayed_channel == FixedQuantity::kNoChannel;
-  });
-  const std::vector<FixedQuantity> delays(late.begin(), late.end());
-  quantities.erase(late.begin(), late.end());
+  };
+  const auto late = std::stable_partition(quantities.begin(), quantities.end(), is_other);
+  const std::vector<FixedQuantity> delays(late, quantities.end());
+  quantities.erase(late, quantities.end());
   return delays;
 }
 

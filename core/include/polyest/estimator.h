@@ -96,8 +96,9 @@ class Estimator {
 
   // Returns the same estimate, with FIXED_VALUE_CONFLICT if its residuals ask for another value
   // of a parameter, an initial state, a gain, a delay or an offset that the problem holds fixed;
-  // parameters that this would move are then kWeak at most. To tell that, the model runs again along the record, its first 65,536 rows at most. Not OK on a
-  // stop request or an error of the store; otherwise as CurrentEstimate.
+  // parameters that this would move are then kWeak at most. To tell that, the model runs again
+  // along the record, its first 65,536 rows at most. Not OK on a stop request or an error of the
+  // store; otherwise as CurrentEstimate.
   absl::StatusOr<Estimate> TestedEstimate(const Stop& stop = {}) const;
 
   // Returns the posterior of the same samples in detail. INVALID_ARGUMENT names the option, its

@@ -5,6 +5,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "tests/unit/core/estimator/estimation.h"
 
 namespace polyest::internal {
@@ -51,15 +53,15 @@ TEST(FixedQuantities, AreNotThoseThatAreUncertainOrDerived) {
 
 TEST(FixedQuantities, HaveTheValuesOfTheProblemOrTheModel) {
   const ResolvedProblem problem = ResolvedProblem::Make(Oscillator()).value();
-  for (const FixedQuantity& quantity : FixedQuantitiesOf(problem, 0.1)) {
-    if (quantity.name == "m") EXPECT_EQ(quantity.value, 2);
-    if (quantity.name == "x.gain") EXPECT_EQ(quantity.value, 1.5);
-    if (quantity.name == "v0") EXPECT_EQ(quantity.value, 0);
-    if (quantity.name == "x.delay") {
-      EXPECT_EQ(quantity.delayed_channel, 0);
-      EXPECT_LE(quantity.most, 0.1);
-    }
-  }
+  const std::vector<FixedQuantity> quantities = FixedQuantitiesOf(problem, 0.1);
+  const auto find = [&](const char* name) {
+    return *std::ranges::find(quantities, name, &FixedQuantity::name);
+  };
+  EXPECT_EQ(find("m").value, 2);
+  EXPECT_EQ(find("x.gain").value, 1.5);
+  EXPECT_EQ(find("v0").value, 0);
+  EXPECT_EQ(find("x.delay").delayed_channel, 0);
+  EXPECT_LE(find("x.delay").most, 0.1);
 }
 
 TEST(FixedQuantities, BecomeUncertainAfterTheOthers) {
