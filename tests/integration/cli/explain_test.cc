@@ -221,9 +221,10 @@ TEST_F(RemediesTest, ComeAfterAFixedValueThatIsWrong) {
     absl::StrAppend(&record, line.substr(0, comma), ",", 1.05 * std::stod(line.substr(comma + 1)),
                     "\n");
   }
-  EXPECT_THAT(Explain(PerfectOscillator(kReleased, kStiffness), File("record.csv", record)),
-              AllOf(HasSubstr("fixed value in conflict: the residuals ask for x"),
-                    HasSubstr(" = 1.05"), HasSubstr("Before any remedy below, correct what")));
+  EXPECT_THAT(
+      Explain(PerfectOscillator(kReleased, kStiffness), File("record.csv", record)),
+      AllOf(HasSubstr("fixed value in conflict: the residuals ask for x"),
+            HasSubstr(" instead of 1 "), HasSubstr("Before any remedy below, correct what")));
 }
 
 TEST_F(RemediesTest, NoEvidenceIsNeededForARemedyThatLeavesNoContradiction) {
