@@ -98,9 +98,13 @@ double ColumnFacts::Resolution(size_t least) const {
   return step;
 }
 
-void InputFacts::Add(const SampleRow& row) {
+void InputFacts::Add(const SampleRow& row, double next) {
   intervals.Add(row);
   last_s = row.time_s;
+  const double change = next - value;
+  if (samples_in_run > 1) bends += (change - step) * (change - step);
+  step = change;
+  value = next;
   ++samples_in_run;
 }
 
@@ -114,7 +118,8 @@ void InputFacts::EndRun(double last_row_s) {
 }
 
 bool InputFacts::IsConsistent() const {
-  return intervals.IsConsistent() && runs_without >= 0 && longest_end_s >= 0 && samples_in_run >= 0;
+  return intervals.IsConsistent() && runs_without >= 0 && longest_end_s >= 0 &&
+         samples_in_run >= 0 && bends >= 0;
 }
 
 bool DataFacts::IsFor(size_t columns, size_t inputs) const {
@@ -146,7 +151,7 @@ void DataFacts::Add(const RowBlock& block, int row, int channels) {
     if (i < m) {
       columns_[i].faults.Add(value);
     } else {
-      inputs_[i - m].Add(block.rows[k]);
+      inputs_[i - m].Add(block.rows[k], value);
     }
   }
   if (block.run_ended && row + 1 == block.count()) EndRun();

@@ -87,7 +87,7 @@ struct ColumnFacts {
   }
 };
 
-// The times of a streamed input's samples.
+// The times of a streamed input's samples, and how much it bends between them.
 struct InputFacts {
   IntervalFacts intervals;                   // between its samples
   int64_t runs_without = 0;                  // runs that have ended without any sample of it
@@ -95,14 +95,17 @@ struct InputFacts {
                                              // run's last row, and the time of that sample
   double last_s = 0;                         // time of the last sample, if the run has any
   int64_t samples_in_run = 0;
+  double value = 0, step = 0;  // the last one in the run, and its change from the one before
+  double bends = 0;  // Σ of squares of second differences u_k − 2 u_(k−1) + u_(k−2)
 
-  void Add(const SampleRow& row);
+  void Add(const SampleRow& row, double next);
   void EndRun(double last_row_s);
   bool IsConsistent() const;  // false after reading what was never written
 
   template <class Archive>
   void serialize(Archive& archive) {
-    archive(intervals, runs_without, longest_end_s, end_from_s, last_s, samples_in_run);
+    archive(intervals, runs_without, longest_end_s, end_from_s, last_s, samples_in_run, value, step,
+            bends);
   }
 };
 

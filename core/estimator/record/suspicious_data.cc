@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <string>
 #include <vector>
 
@@ -23,6 +24,10 @@ constexpr double kUnlikely = 5e-3;
 constexpr double kRiseOfNoise = 10;
 constexpr int64_t kMinConstant = 3;  // samples of one value before it is said never to change
 constexpr int64_t kMinDropouts = 4;  // to one value before they are mentioned
+constexpr int64_t kMinBends = 32;    // samples of an input before its bends are judged
+constexpr int kOfLines = 1;          // knots that straight lines need
+constexpr double kMostLost = 0.02;   // of an amplitude, by straight lines
+constexpr double kMinPerPeriod = 5;  // samples, for a curve
 constexpr int64_t kMinPlateaus = 4;  // at either end of a range before they are mentioned
 // A fit explains its samples only with so many degrees of freedom left, and noise that is learned
 // from it must be so much smaller than the samples' spread.
@@ -94,6 +99,8 @@ class Warnings {
     for (size_t i = 0; i < inputs_.size(); ++i) {
       AddGaps(NameOf(channels + i), inputs_[i].intervals);
       AddEnds(NameOf(channels + i), inputs_[i], problem_.knots_needed()[i] == 0);
+      AddBends(NameOf(channels + i), inputs_[i], columns_[channels + i],
+               problem_.knots_needed()[i]);
     }
     AddLateStart();
     int64_t samples = 0;
@@ -159,6 +166,29 @@ class Warnings {
     Add("%s: the streamed input has no sample in the last %g s of a run, after t = %g s, and is "
         "taken to stay at its last value there",
         name, input.longest_end_s, input.end_from_s);
+  }
+
+  // Between its samples an input follows straight lines or a curve. The second differences of a
+  // sine that advances by w from sample to sample have (2 sin(w/2))⁴ of its mean square, and
+  // straight lines lose w²/12 of its amplitude.
+  void AddBends(const std::string& name, const InputFacts& input, const ColumnFacts& column,
+                int knots_needed) {
+    if (knots_needed == 0 || column.samples < kMinBends || !(column.square_sum > 0)) return;
+    const double chord = std::pow(input.bends / column.square_sum, 0.25);
+    const double w = 2 * std::asin(std::min(1.0, chord / 2));
+    const double per_period = 2 * std::numbers::pi / w;
+    const double lost = w * w / 12;
+    if (knots_needed == kOfLines && lost > kMostLost) {
+      Add("%s: about %.2g samples of the streamed input are a period of it, and straight lines "
+          "between them lose %.2g %% of its amplitude; let it follow the smooth curve, or sample "
+          "it "
+          "more often",
+          name, per_period, 100 * lost);
+    } else if (knots_needed > kOfLines && per_period < kMinPerPeriod) {
+      Add("%s: about %.2g samples of the streamed input are a period of it, so that the curve "
+          "between them is a guess; sample it more often, or say that it is held if it is",
+          name, per_period);
+    }
   }
 
   const ChannelFit* FitOf(size_t channel) const {

@@ -103,6 +103,29 @@ TEST(SuspiciousData, AreGapsOfAStreamedInputOnly) {
   EXPECT_THAT(WarningsOf(VelocityProblem(), InitialVelocityRecord(times, 1.1, 0.01)), IsEmpty());
 }
 
+// A force with so many samples a period, too small to move the mass.
+std::vector<std::string> WarningsOfForce(double per_period, Interpolation interpolation) {
+  Problem problem = VelocityProblem();
+  problem.inputs = {{"force", StreamedInput{.interpolation = interpolation}}};
+  const std::vector<double> times = TimesFrom(0, 100);
+  Samples samples = ForcedRecord(times);
+  for (size_t k = 0; k < times.size(); ++k) {
+    samples.columns[1].value[k] = 1e-6 * std::sin(2 * std::numbers::pi * k / per_period);
+  }
+  return WarningsOf(problem, samples);
+}
+
+// Straight lines between 10 samples a period lose (2π/10)²/12 = 3.3 % of a sine.
+TEST(SuspiciousData, AreInputsWithTooFewSamplesForTheirInterpolation) {
+  EXPECT_THAT(WarningsOfForce(10, Interpolation::kLinear),
+              ElementsAre(AllOf(HasSubstr("about 10 samples"), HasSubstr("lose 3.3 %"))));
+  EXPECT_THAT(WarningsOfForce(20, Interpolation::kLinear), IsEmpty());
+  EXPECT_THAT(WarningsOfForce(3.3, Interpolation::kCubic),
+              ElementsAre(AllOf(HasSubstr("about 3.3 samples"), HasSubstr("is a guess"))));
+  EXPECT_THAT(WarningsOfForce(10, Interpolation::kCubic), IsEmpty());
+  EXPECT_THAT(WarningsOfForce(3.3, Interpolation::kHold), IsEmpty());
+}
+
 TEST(SuspiciousData, AreNoSamplesAfterTheLargestDelayThatThePriorAllows) {
   Problem problem = VelocityProblem();
   problem.uncertain.push_back(UncertainParameter::Uniform("x.delay", 0, 5).value());
