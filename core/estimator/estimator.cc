@@ -190,14 +190,12 @@ absl::StatusOr<Estimate> Estimator::Implementation::CurrentEstimate(const Stop& 
 absl::StatusOr<Estimate> Estimator::Implementation::TestedEstimate(const Stop& stop) const {
   POLYEST_ASSIGN_OR_RETURN(AssessedMixture assessed, mixture_->Assess(PosteriorEffort(), stop));
   Estimate& estimate = assessed.whole.estimate;
-  if (IsWorthTesting(estimate)) {
-    const MixtureComponent& heaviest = mixture_->component(assessed.order.front());
-    POLYEST_ASSIGN_OR_RETURN(
-        const FixedValueTests tests,
-        TestFixedQuantities(estimated_problem(), *store_, rows_processed(),
-                            heaviest.expansion().noise().channels, estimate, stop));
-    AddScoreTests(tests, estimate);
-  }
+  if (!IsWorthTesting(estimate)) return std::move(estimate);
+  const LearnedNoise& noise = mixture_->component(assessed.order.front()).expansion().noise();
+  POLYEST_ASSIGN_OR_RETURN(const FixedValueTests tests,
+                           TestFixedQuantities(estimated_problem(), *store_, rows_processed(),
+                                               noise.channels, estimate, stop));
+  AddScoreTests(tests, estimate);
   return std::move(estimate);
 }
 
