@@ -132,11 +132,13 @@ void VariableList::NoteTime(const pugi::xml_node& unknown, int version) {
     derivatives_use_time_ = true;
     return;
   }
-  const std::string name = absl::StrCat(version == 2 ? time - variables_.begin() + 1
-                                                     : ptrdiff_t{time->variable.reference});
+  const int64_t of_time =
+      version == 2 ? time - variables_.begin() + 1 : int64_t{time->variable.reference};
   for (const absl::string_view known :
        absl::StrSplit(dependencies.value(), absl::ByAnyChar(" \t\r\n"), absl::SkipEmpty())) {
-    derivatives_use_time_ = derivatives_use_time_ || known == name;
+    int64_t number = 0;
+    const bool is_number = absl::SimpleAtoi(known, &number);
+    derivatives_use_time_ = derivatives_use_time_ || !is_number || number == of_time;
   }
 }
 

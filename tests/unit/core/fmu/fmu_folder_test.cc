@@ -274,6 +274,7 @@ TEST_F(FmuFolder, SaysWhetherDerivativesMayDependOnTheTime) {
   EXPECT_FALSE(UsesTime2(time2, " dependencies=\"\""));
   EXPECT_TRUE(UsesTime2(time2, " dependencies=\"1 3\""));
   EXPECT_TRUE(UsesTime2(time2, ""));
+  EXPECT_TRUE(UsesTime2(time2, " dependencies=\"x\""));
   EXPECT_TRUE(UsesTime2("", " dependencies=\"1\""));
   const std::string time3 = "<Float64 name=\"t\" valueReference=\"9\" causality=\"independent\"/>";
   EXPECT_FALSE(UsesTime3(time3, " dependencies=\"7\""));
