@@ -87,7 +87,7 @@ absl::StatusOr<v1::Measurements> RecordOf(Client& client, const v1::Session& ses
 
 // Lets the estimate of a session be that of its record in one call, which tests what the problem
 // holds fixed. Where that cannot be computed, it stays as it is.
-void Test(Backend& backend, ExplainInput& input) {
+void EstimateAtOnce(Backend& backend, ExplainInput& input) {
   v1::ComputeEstimateRequest request;
   v1::Experiment& experiment = *request.mutable_subject()->mutable_experiment();
   *experiment.mutable_problem() = input.problem;
@@ -113,7 +113,7 @@ absl::StatusOr<ExplainInput> ReadSession(const ExplainArguments& arguments, Back
   if (all || StreamsInput(session.problem())) {
     POLYEST_ASSIGN_OR_RETURN(input.measurements, RecordOf(client, session, arguments.place, all));
   }
-  if (all) Test(backend, input);
+  if (all) EstimateAtOnce(backend, input);
   return input;
 }
 

@@ -180,9 +180,8 @@ class Warnings {
     const double lost = w * w / 12;
     if (knots_needed == kOfLines && lost > kMostLost) {
       Add("%s: about %.2g samples of the streamed input are a period of it, and straight lines "
-          "between them lose %.2g %% of its amplitude; let it follow the smooth curve, or sample "
-          "it "
-          "more often",
+          "between them lose %.2g %% of its amplitude; let it follow the smooth curve, sample it "
+          "more often, or say that it is held if it is",
           name, per_period, 100 * lost);
     } else if (knots_needed > kOfLines && per_period < kMinPerPeriod) {
       Add("%s: about %.2g samples of the streamed input are a period of it, so that the curve "
