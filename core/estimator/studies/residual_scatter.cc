@@ -34,6 +34,11 @@ double ResidualScatter::ChiSquared() const {
   return total;
 }
 
+double ResidualScatter::MeanSquare(Eigen::Index channel) const {
+  const Channel& of = channels_[static_cast<size_t>(channel)];
+  return of.samples == 0 ? 1 : of.squares / of.samples;
+}
+
 double ResidualScatter::Dispersion() const {
   constexpr double kMostCorrelation = 0.999;
   double largest = 1;

@@ -18,6 +18,8 @@ class ResidualScatter {
   void Add(const Vector& residuals, bool begins_run);
 
   double ChiSquared() const;
+  // Returns χ²/N of a channel; 1 if it has no samples.
+  double MeanSquare(Eigen::Index channel) const;
   // Returns the variance of sums of residuals relative to that of right ones, at least 1. It is
   // that of the channel where it is largest: χ²/N times (1 + r)/(1 − r), r the correlation of
   // successive residuals, or times the variance of sums of 16 of them relative to that of

@@ -22,6 +22,9 @@ constexpr int64_t kFirstRows = 256;  // from which steps and the sampling interv
 // far above the rounding and far below what is not linear.
 constexpr double kLeastNorm = 0.03, kMostNorm = 30;
 constexpr int kMostPasses = 4;
+// In standard deviations. Where the noise's correlation is unknown, the estimate is the minimum of
+// an average over it.
+constexpr double kMostFromMinimum = 2;
 // Part of g that the uncertain parameters must leave, squared.
 constexpr double kLeastOwn = 1e-6;
 
@@ -33,6 +36,39 @@ bool AreDefinedFor(const ResolvedProblem& problem) {
   return !problem.uses_filters() && !problem.per_run() && problem.channels() > 0 &&
          dynamic_cast<const StateSpaceModel*>(problem.model().get()) != nullptr &&
          std::ranges::all_of(problem.problem().measured, HasPlainLikelihood);
+}
+
+Vector MapOf(const Estimate& estimate) {
+  Vector theta(std::ssize(estimate.parameters));
+  for (Eigen::Index i = 0; i < theta.size(); ++i) {
+    theta[i] = estimate.parameters[static_cast<size_t>(i)].map;
+  }
+  return theta;
+}
+
+// Returns the noise of which the residuals of the estimate are where its size is unknown. The cost
+// is integrated over such a size, so that the one with which the record is weighed may be another.
+absl::StatusOr<std::vector<ChannelNoise>> NoiseOfResiduals(const ResolvedProblem& problem,
+                                                           const SampleStore& store, int64_t rows,
+                                                           std::vector<ChannelNoise> noise,
+                                                           const Estimate& estimate,
+                                                           const Stop& stop) {
+  constexpr double kLeastMeanSquare = 1e-24;  // where the residuals vanish
+  const std::vector<MeasuredOutput>& measured = problem.problem().measured;
+  const auto is_unknown = [](const MeasuredOutput& output) { return output.noise.unknown; };
+  if (std::ranges::none_of(measured, is_unknown)) return noise;
+  ResidualScatter scatter(problem.channels());
+  const auto add = [&scatter](const Matrix& values, bool begins_run) {
+    scatter.Add(values.row(0).transpose(), begins_run);
+  };
+  POLYEST_RETURN_IF_ERROR(
+      ResidualPass(problem, store, noise).Run(MapOf(estimate).transpose(), rows, 0, add, stop));
+  for (size_t c = 0; c < measured.size(); ++c) {
+    const double mean_square = scatter.MeanSquare(static_cast<Eigen::Index>(c));
+    if (!measured[c].noise.unknown || !std::isfinite(mean_square)) continue;
+    noise[c].scale *= std::sqrt(std::max(kLeastMeanSquare, mean_square));
+  }
+  return noise;
 }
 
 // Returns the Gram matrix of residuals and differences (ResidualPass). A trajectory that fails has
@@ -63,13 +99,11 @@ class Neighbours {
  public:
   Neighbours(const Prior& prior, const Estimate& estimate, std::vector<FixedQuantity> quantities)
       : prior_(prior), quantities_(std::move(quantities)) {
-    const auto n = static_cast<Eigen::Index>(estimate.parameters.size());
-    Vector theta(n), contraction(n);
-    for (Eigen::Index i = 0; i < n; ++i) {
-      theta[i] = estimate.parameters[static_cast<size_t>(i)].map;
+    xi_ = prior.ToGerm(MapOf(estimate));
+    Vector contraction(xi_.size());
+    for (Eigen::Index i = 0; i < xi_.size(); ++i) {
       contraction[i] = estimate.parameters[static_cast<size_t>(i)].contraction;
     }
-    xi_ = prior.ToGerm(theta);
     steps_ = kOfDeviation * contraction.cwiseMax(kLeastFactor).cwiseProduct(Deviations());
     TurnInward();
   }
@@ -157,7 +191,7 @@ class LinearTests {
     const Vector slope = gram.col(0).segment(1, n_) -
                          regularization * prior.Gradient(at.xi()).cwiseProduct(at.steps());
     to_minimum_ = factor_.Solve(slope);
-    is_minimum_ = slope.dot(to_minimum_) <= 1;
+    is_minimum_ = slope.dot(to_minimum_) <= kMostFromMinimum * kMostFromMinimum;
     jacobian_ = prior.Jacobian(at.xi()) * at.steps().asDiagonal();
     deviations_.resize(n_);
     for (Eigen::Index i = 0; i < n_; ++i) {
@@ -165,7 +199,7 @@ class LinearTests {
     }
   }
 
-  // Whether the estimate is a minimum within one standard deviation.
+  // Whether the estimate is a minimum within kMostFromMinimum.
   bool is_minimum() const { return is_minimum_; }
 
   // Returns the test of a quantity, with its place among the trajectories; nothing if the
@@ -279,10 +313,8 @@ absl::StatusOr<std::optional<Correction>> Correct(const ResolvedProblem& problem
   if (!extended) return std::nullopt;
   const Eigen::Index n = score.parameters.size();
   Matrix thetas(2, n + 1);
-  for (Eigen::Index i = 0; i < n; ++i) {
-    thetas(0, i) = estimate.parameters[static_cast<size_t>(i)].map;
-    thetas(1, i) = score.parameters[i];
-  }
+  thetas.row(0).head(n) = MapOf(estimate).transpose();
+  thetas.row(1).head(n) = score.parameters.transpose();
   thetas(0, n) = quantity.value;
   thetas(1, n) = quantity.other;
   ResidualScatter before(problem.channels()), after(problem.channels());
@@ -299,11 +331,13 @@ absl::StatusOr<std::optional<Correction>> Correct(const ResolvedProblem& problem
 
 absl::StatusOr<FixedValueTests> TestFixedQuantities(const ResolvedProblem& problem,
                                                     const SampleStore& store, int64_t rows,
-                                                    const std::vector<ChannelNoise>& noise,
+                                                    const std::vector<ChannelNoise>& learned,
                                                     const Estimate& estimate, const Stop& stop) {
   FixedValueTests tests;
   rows = std::min(rows, kMostRows);
   if (!AreDefinedFor(problem) || rows == 0) return tests;
+  POLYEST_ASSIGN_OR_RETURN(const std::vector<ChannelNoise> noise,
+                           NoiseOfResiduals(problem, store, rows, learned, estimate, stop));
   POLYEST_ASSIGN_OR_RETURN(tests.scores, ScoresOf(problem, store, rows, noise, estimate, stop));
   std::ranges::stable_sort(tests.scores, std::greater<>(),
                            [](const ScoreTest& score) { return std::abs(score.score); });

@@ -22,13 +22,16 @@ namespace {
 
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::SizeIs;
 using ::testing::StartsWith;
 
-std::vector<ScoreTest> TestsOf(const Problem& problem, const Samples& samples) {
+// Weighs the samples with so many times the noise to begin with.
+std::vector<ScoreTest> TestsOf(const Problem& problem, const Samples& samples, double scale = 1) {
   const ResolvedProblem resolved = ResolvedProblem::Make(problem).value();
   const std::shared_ptr<SampleStore> store = StoreFor(resolved, nullptr);
   EXPECT_TRUE(store->Append(SampleChecks(resolved).Check(samples).value()).ok());
-  const std::vector<ChannelNoise> noise = NoiseToBeginWith(problem).channels;
+  std::vector<ChannelNoise> noise = NoiseToBeginWith(problem).channels;
+  noise[0].scale = scale;
   return TestFixedQuantities(resolved, *store, store->rows(), noise, EstimateOf(problem, samples),
                              Stop())
       .value()
@@ -167,6 +170,27 @@ TEST(ScoreTests, AreStandardNormalWhereAllIsRight) {
   EXPECT_EQ(squares.size(), 9u);  // of x: gain, delay, offset; of the force, too; m, x0, v0
   for (const auto& [name, mean] : squares) {
     EXPECT_NEAR(mean, 1, 4 * std::sqrt(2.0 / kRecords)) << name;
+  }
+}
+
+// The cost is integrated over a size that is unknown, and the one that the sums are taken with need
+// not be that of the residuals.
+TEST(ScoreTests, TakeNoiseOfUnknownSizeFromTheResiduals) {
+  Problem problem = DrivenOscillator();
+  const Samples samples = RecordOf(problem, 5);
+  problem.measured[0].noise = {.unknown = true};
+  const std::vector<ScoreTest> right = TestsOf(problem, samples, 0.002);
+  ASSERT_THAT(right, SizeIs(9));
+  // 400 residuals tell the size of their noise within 3.5 %.
+  const std::vector<ScoreTest> known = TestsOf(DrivenOscillator(), samples);
+  EXPECT_NEAR(Find(right, "x.delay").deviation, Find(known, "x.delay").deviation,
+              0.1 * Find(known, "x.delay").deviation);
+  for (const double factor : {0.8, 1.2}) {
+    const std::vector<ScoreTest> tests = TestsOf(problem, samples, 0.002 * factor);
+    ASSERT_THAT(tests, SizeIs(right.size())) << factor;
+    for (const ScoreTest& test : right) {
+      EXPECT_NEAR(Find(tests, test.name).score, test.score, 1e-3) << test.name << factor;
+    }
   }
 }
 
