@@ -51,5 +51,5 @@ cd "$root"
 # Said outright, since a build folder remembers what it was last configured with.
 cmake --preset "$preset" -DPOLYEST_BUILD_TESTS=ON -DPOLYEST_WARNINGS_AS_ERRORS="$werror"
 cmake --build --preset "$preset" --parallel "$(nproc)" "${targets[@]}"
-# The preset runs three tests at a time, since many wait for daemons, databases and browsers.
+# The preset runs three or four at a time, since many wait for daemons, databases and browsers.
 exec ctest --preset "$preset" "${ctest_arguments[@]}"
