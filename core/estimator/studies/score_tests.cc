@@ -22,8 +22,8 @@ constexpr int64_t kFirstRows = 256;  // from which steps and the sampling interv
 // far above the rounding and far below what is not linear.
 constexpr double kLeastNorm = 0.03, kMostNorm = 30;
 constexpr int kMostPasses = 4;
-// In standard deviations. Where the noise's correlation is unknown, the estimate is the minimum of
-// an average over it.
+// Largest distance of an estimate from the minimum of the cost, in standard deviations. It is not 0
+// where the noise's correlation is unknown, since the estimate averages over that.
 constexpr double kMostFromMinimum = 2;
 // Part of g that the uncertain parameters must leave, squared.
 constexpr double kLeastOwn = 1e-6;
@@ -46,8 +46,9 @@ Vector MapOf(const Estimate& estimate) {
   return theta;
 }
 
-// Returns the noise of which the residuals of the estimate are where its size is unknown. The cost
-// is integrated over such a size, so that the one with which the record is weighed may be another.
+// Returns the noise with each unknown size set to the root mean square of the estimate's residuals.
+// The size with which the record is weighed may differ from that by a quarter, since the cost is
+// integrated over it.
 absl::StatusOr<std::vector<ChannelNoise>> NoiseOfResiduals(const ResolvedProblem& problem,
                                                            const SampleStore& store, int64_t rows,
                                                            std::vector<ChannelNoise> noise,

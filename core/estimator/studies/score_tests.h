@@ -63,8 +63,9 @@ struct FixedValueTests {
 //
 // There are no tests of a problem with filters, with parameters of runs, with outliers handled or
 // relative noise, or with a model that simulates itself; nor if the estimate is no minimum within
-// two standard deviations. `learned` is the noise with which the record has been weighed. Returns
-// an error only on a stop request, or of the store.
+// two standard deviations. `learned` is the noise with which the record has been weighed; where its
+// size is unknown, that of the residuals takes its place. Returns an error only on a stop request,
+// or of the store.
 absl::StatusOr<FixedValueTests> TestFixedQuantities(const ResolvedProblem& problem,
                                                     const SampleStore& store, int64_t rows,
                                                     const std::vector<ChannelNoise>& learned,

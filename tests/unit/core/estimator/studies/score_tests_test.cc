@@ -25,7 +25,7 @@ using ::testing::IsEmpty;
 using ::testing::SizeIs;
 using ::testing::StartsWith;
 
-// Weighs the samples with so many times the noise to begin with.
+// `scale` is that of the noise with which the record has been weighed (ChannelNoise::scale).
 std::vector<ScoreTest> TestsOf(const Problem& problem, const Samples& samples, double scale = 1) {
   const ResolvedProblem resolved = ResolvedProblem::Make(problem).value();
   const std::shared_ptr<SampleStore> store = StoreFor(resolved, nullptr);
@@ -173,8 +173,7 @@ TEST(ScoreTests, AreStandardNormalWhereAllIsRight) {
   }
 }
 
-// The cost is integrated over a size that is unknown, and the one that the sums are taken with need
-// not be that of the residuals.
+// The size of unknown noise with which the record has been weighed does not matter.
 TEST(ScoreTests, TakeNoiseOfUnknownSizeFromTheResiduals) {
   Problem problem = DrivenOscillator();
   const Samples samples = RecordOf(problem, 5);
