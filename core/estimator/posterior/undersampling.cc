@@ -14,7 +14,7 @@ namespace {
 constexpr int kPhases = 8;  // number of equal parts of an interval between samples
 // Fewest rows and turning points from which a response is judged.
 constexpr int kFewestRows = 8;
-constexpr int kFewestTurns = 4;
+constexpr size_t kFewestTurns = 4;
 // A turning point counts if the response swings by more than this many standard deviations of the
 // noise before and after it.
 constexpr double kSwing = 4;
@@ -157,29 +157,30 @@ Vector OutputOf(const Matrix& outputs, Eigen::Index run, int channel, int channe
                              [&](Eigen::Index i) { return outputs(run, i * channels + channel); });
 }
 
-// Returns the number of turning points between two samples, the mean up to the last one; 0 where
-// there are too few. `outputs` is a channel at all times of FineTimes, and what it swings by less
-// than `least` does not count.
-double TurnsBetweenSamples(const Vector& outputs, const std::vector<int>& rows, double least) {
+// Returns the number of turning points between two samples, the mean from the first to the last
+// one; 0 where there are too few. `outputs` is a channel at all times of FineTimes, and what it
+// swings by less than `least` does not count.
+double TurnsBetweenSamples(const Vector& outputs, const Times& times, const std::vector<int>& rows,
+                           double least) {
   const auto at = [](int row) { return (row + 1) * kPhases - 1; };
-  double low = outputs[at(rows.front())], high = low;
-  int direction = 0, turns = 0, last = 0;
-  for (int j = at(rows.front()); j <= at(rows.back()); ++j) {
-    low = std::min(low, outputs[j]);
-    high = std::max(high, outputs[j]);
-    const bool rises = direction <= 0 && outputs[j] - low > least;
-    const bool falls = direction >= 0 && high - outputs[j] > least;
+  const auto time = [&](int j) { return times.time_s[static_cast<size_t>(j)]; };
+  const int begin = at(rows.front()), end = at(rows.back());
+  int low = begin, high = begin;  // where the output was the lowest and the highest since a turn
+  int direction = 0;
+  std::vector<int> turns;
+  for (int j = begin; j <= end; ++j) {
+    if (outputs[j] < outputs[low]) low = j;
+    if (outputs[j] > outputs[high]) high = j;
+    const bool rises = direction <= 0 && outputs[j] - outputs[low] > least;
+    const bool falls = direction >= 0 && outputs[high] - outputs[j] > least;
     if (!rises && !falls) continue;
-    if (direction != 0) {
-      ++turns;
-      last = j;
-    }
+    if (direction != 0) turns.push_back(rises ? low : high);
     direction = rises ? 1 : -1;
-    low = high = outputs[j];
+    low = high = j;
   }
-  if (turns < kFewestTurns) return 0;
-  const auto until = std::ranges::count_if(rows, [&](int row) { return at(row) < last; });
-  return static_cast<double>(turns) / static_cast<double>(until);
+  if (turns.size() < kFewestTurns) return 0;
+  const double interval = (time(end) - time(begin)) / (std::ssize(rows) - 1.0);
+  return (std::ssize(turns) - 1.0) * interval / (time(turns.back()) - time(turns.front()));
 }
 
 // A channel whose response turns so often that others have the same samples.
@@ -190,7 +191,8 @@ struct Aliased {
 
 // Returns the channel that turns the least of all that turn in a run, unless it turns so seldom
 // that it has no images or the samples are uneven.
-std::optional<Aliased> AliasedChannel(const Findings& findings, const Matrix& outputs) {
+std::optional<Aliased> AliasedChannel(const Findings& findings, const Times& times,
+                                      const Matrix& outputs) {
   const RowBlock& beginning = findings.record->beginning();
   const int m = findings.problem->channels();
   const double rare = findings.problem->dimension() > kMostSearched ? kRare : kRareIfSearched;
@@ -200,8 +202,8 @@ std::optional<Aliased> AliasedChannel(const Findings& findings, const Matrix& ou
     if (std::ssize(rows) < kFewestRows) continue;
     const Vector channel = OutputOf(outputs, 0, c, m);
     const double largest = channel.cwiseAbs().maxCoeff();
-    const double turns =
-        TurnsBetweenSamples(channel, rows, kSwing * Deviation(findings, c, largest, largest));
+    const double turns = TurnsBetweenSamples(channel, times, rows,
+                                             kSwing * Deviation(findings, c, largest, largest));
     if (turns == 0) continue;
     if (turns < rare || !AreEven(beginning, rows)) return std::nullopt;
     if (!least || turns < least->turns) least = Aliased{c, turns};
@@ -240,7 +242,7 @@ bool PriorAllowsAnImage(const Findings& findings, const Times& times, const Alia
     const Vector channel = OutputOf(*outputs, run, aliased.channel, m);
     const double largest = channel.cwiseAbs().maxCoeff();
     const double least = kSwing * Deviation(findings, aliased.channel, largest, largest);
-    const double turns = TurnsBetweenSamples(channel, rows, least);
+    const double turns = TurnsBetweenSamples(channel, times, rows, least);
     if (turns > 0 && PassesAnImage(aliased.turns, turns)) return true;
   }
   return false;
@@ -258,7 +260,7 @@ void AddAliasing(const Findings& findings, const Estimate& estimate,
   const Vector theta = findings.problem->prior().ToParameters(findings.map_xi);
   const std::optional<Matrix> outputs = RunAt(*findings.problem, theta.transpose(), times.time_s);
   if (!outputs) return;
-  const auto aliased = AliasedChannel(findings, *outputs);
+  const auto aliased = AliasedChannel(findings, times, *outputs);
   if (!aliased || !PriorAllowsAnImage(findings, times, *aliased)) return;
   const auto channel = static_cast<size_t>(aliased->channel);
   diagnostics.push_back(
