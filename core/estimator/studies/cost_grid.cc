@@ -13,16 +13,14 @@
 #include "core/common/status.h"
 #include "core/estimator/posterior/noise_learning.h"
 #include "core/estimator/record/known_inputs_store.h"
-#include "core/estimator/record/run_inputs.h"
 #include "core/estimator/record/sample_checks.h"
-#include "core/estimator/record/whitening.h"
+#include "core/estimator/studies/record_pass.h"
 
 namespace polyest::internal {
 namespace {
 
-// Numbers of grid points and of sample times processed at once; they bound the memory.
+// Number of grid points processed at once; it bounds the memory.
 constexpr Eigen::Index kPointsAtATime = 1024;
-constexpr int64_t kTimesAtATime = 64;
 // Half the range of an axis without a bound, in standard deviations from the mean.
 constexpr double kDeviations = 4;
 
@@ -125,98 +123,53 @@ class ModelMismatch {
   // `store` has the whole record.
   ModelMismatch(const ResolvedProblem& problem, const SampleStore& store, int threads)
       : problem_(problem),
-        store_(store),
-        threads_(threads),
-        channels_(static_cast<size_t>(problem.channels())),
-        width_(channels_ + problem.streamed_inputs().size()) {}
+        rows_(store.rows()),
+        pass_(problem, store, NoiseAsStated(problem.problem()), threads) {}
 
   absl::StatusOr<Vector> Evaluate(const Matrix& thetas, const Stop& stop) const {
-    const auto m = static_cast<Eigen::Index>(channels_);
+    const Eigen::Index m = problem_.channels();
     Sums sums{Matrix::Zero(thetas.rows(), m), Matrix::Zero(thetas.rows(), m),
               Matrix::Zero(thetas.rows(), m), Vector::Zero(m)};
-    std::optional<Run> run;
-    RowBlock block;
-    for (int64_t first = 0; first < store_.rows(); first += block.count()) {
-      POLYEST_RETURN_IF_ERROR(stop.Check());
-      POLYEST_RETURN_IF_ERROR(ReadOfOneRun(first, block));
-      if (const int number = block.rows.front().run; !run || run->number != number) {
-        if (run) EndRun(run->ensemble, sums);
-        run.emplace(*this, thetas, number, first);
+    const auto add = [&](const RowBlock& block, const Matrix& outputs, bool begins_run) {
+      if (begins_run) EndRun(sums);
+      for (Eigen::Index row = 0; row < block.count(); ++row) {
+        AddRow(block, row, outputs.middleCols(row * m, m), sums);
       }
-      POLYEST_RETURN_IF_ERROR(AddRows(block, *run, sums, stop));
-    }
-    if (run) EndRun(run->ensemble, sums);
+    };
+    POLYEST_RETURN_IF_ERROR(pass_.Run(thetas, rows_, /*late_s=*/0, add, stop));
+    EndRun(sums);
     return Total(sums);
   }
 
  private:
   // With u_k a residual in units of its noise: Σ u_k², Σ (u_k − u_{k−1})² and the last u_k, by
-  // point and channel, and the number of samples by channel.
+  // point and channel, and the number of samples by channel. NaN from a point's failure on.
   struct Sums {
     Matrix chi_squared, differences, previous;
     Vector samples;
   };
 
-  // A run, in which the model starts anew, with the run's own inputs.
-  struct Run {
-    Run(const ModelMismatch& of, const Matrix& thetas, int run, int64_t first_row)
-        : number(run),
-          inputs(of.problem_, &of.store_, run, first_row),
-          ensemble(of.problem_.MakeEnsemble(thetas, of.problem_.outputs(), of.threads_, run),
-                   &inputs.signals()),
-          whitening(of.NoiseAsStated(), thetas.rows()) {}
-
-    int number;
-    RunInputs inputs;
-    EnsemblePropagator ensemble;
-    Whitening whitening;
-  };
-
-  std::vector<ChannelNoise> NoiseAsStated() const {
-    std::vector<ChannelNoise> noise = NoiseToBeginWith(problem_.problem()).channels;
+  static std::vector<ChannelNoise> NoiseAsStated(const Problem& problem) {
+    std::vector<ChannelNoise> noise = NoiseToBeginWith(problem).channels;
     for (ChannelNoise& channel : noise) channel.scale = 1;
     return noise;
   }
 
-  // Reads the next rows, as far as they are of the same run.
-  absl::Status ReadOfOneRun(int64_t first, RowBlock& block) const {
-    POLYEST_RETURN_IF_ERROR(
-        store_.Read(first, std::min(kTimesAtATime, store_.rows() - first), block));
-    const int run = block.rows.front().run;
-    const auto same = std::ranges::count(block.rows, run, &SampleRow::run);
-    return same == block.count() ? absl::OkStatus() : store_.Read(first, same, block);
-  }
-
-  absl::Status AddRows(RowBlock& block, Run& run, Sums& sums, const Stop& stop) const {
-    POLYEST_RETURN_IF_ERROR(run.inputs.ReadUpTo(block.rows.back().time_s));
-    std::vector<double> times;
-    for (const SampleRow& row : block.rows) times.push_back(row.time_s);
-    Matrix outputs(sums.previous.rows(), static_cast<Eigen::Index>(times.size() * channels_));
-    POLYEST_RETURN_IF_ERROR(run.ensemble.Advance(times, outputs, stop));
-    run.whitening.Apply(0, block.count(), block, outputs);
-    for (size_t row = 0; row < times.size(); ++row) {
-      AddRow(block, row, outputs, row * channels_, sums);
-    }
-    return absl::OkStatus();
-  }
-
-  static void EndRun(const EnsemblePropagator& ensemble, Sums& sums) {
+  static void EndRun(Sums& sums) {
     sums.differences.array() += sums.previous.array().square();
     sums.previous.setZero();
-    for (const PointFailure& failure : ensemble.failures()) {
-      sums.chi_squared.row(failure.point).setConstant(kInfinity);
-    }
   }
 
-  void AddRow(const RowBlock& block, size_t row, const Matrix& outputs, size_t first_column,
+  // `outputs`: points × channels.
+  void AddRow(const RowBlock& block, Eigen::Index row, const ConstMatrixRef& outputs,
               Sums& sums) const {
-    for (size_t channel = 0; channel < channels_; ++channel) {
-      const double sigma = block.noise[row * channels_ + channel];
+    const Eigen::Index m = problem_.channels();
+    const Eigen::Index width = std::ssize(block.values) / block.count();
+    for (Eigen::Index c = 0; c < m; ++c) {
+      const double sigma = block.noise[static_cast<size_t>(row * m + c)];
       if (!(sigma > 0)) continue;  // missing
-      const double z = block.values[row * width_ + channel];
-      const auto c = static_cast<Eigen::Index>(channel);
-      const auto y = outputs.col(static_cast<Eigen::Index>(first_column + channel)).array();
-      const Eigen::ArrayXd u = (z - y) / sigma;
+      const double z = block.values[static_cast<size_t>(row * width + c)];
+      const Eigen::ArrayXd u = (z - outputs.col(c).array()) / sigma;
       sums.chi_squared.col(c).array() += u.square();
       sums.differences.col(c).array() += (u - sums.previous.col(c).array()).square();
       sums.previous.col(c) = u.matrix();
@@ -230,7 +183,6 @@ class ModelMismatch {
       const NoiseModel& noise = problem_.problem().measured[static_cast<size_t>(c)].noise;
       for (Eigen::Index i = 0; i < mismatch.size(); ++i) {
         const double chi_squared = sums.chi_squared(i, c);
-        // The values of a failed point are NaN from its failure on.
         mismatch[i] += std::isfinite(chi_squared)
                            ? NegativeLogLikelihood(sums.samples[c], chi_squared,
                                                    sums.differences(i, c), noise.unknown,
@@ -242,10 +194,8 @@ class ModelMismatch {
   }
 
   const ResolvedProblem& problem_;
-  const SampleStore& store_;
-  int threads_;
-  size_t channels_;
-  size_t width_;  // number of values in a row: channels, then streamed inputs
+  int64_t rows_;
+  RecordPass pass_;
 };
 
 // Replaces NaN by +∞, the value of J where the model could not be run.

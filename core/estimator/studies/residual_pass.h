@@ -5,13 +5,12 @@
 
 #include <absl/functional/function_ref.h>
 #include <absl/status/status.h>
-#include <absl/status/statusor.h>
 
 #include <vector>
 
 #include "core/estimator/problem/resolved_problem.h"
 #include "core/estimator/record/learned_noise.h"
-#include "polyest/samples.h"
+#include "core/estimator/studies/record_pass.h"
 #include "polyest/stop.h"
 
 namespace polyest::internal {
@@ -25,10 +24,11 @@ class ResidualPass {
   // NaN.
   using Take = absl::FunctionRef<void(const Matrix& values, bool begins_run)>;
 
-  // Correlated noise is whitened with `noise`, that of each channel. All must outlive the pass.
+  // Correlated noise is whitened with `noise`, that of each channel. `problem` and `store` must
+  // outlive the pass.
   ResidualPass(const ResolvedProblem& problem, const SampleStore& store,
                const std::vector<ChannelNoise>& noise)
-      : problem_(problem), store_(store), noise_(noise) {}
+      : problem_(problem), pass_(problem, store, noise, /*threads=*/1) {}
 
   // Integrates the trajectories with parameters `thetas` (one in each row) over the first `rows`
   // rows. Returns an error only on a stop request, or of the store.
@@ -36,16 +36,10 @@ class ResidualPass {
                    const Stop& stop) const;
 
  private:
-  struct RunOfModel;
-
-  absl::Status ReadOfOneRun(int64_t first, int64_t rows, RowBlock& block) const;
-  absl::StatusOr<Matrix> Outputs(const RowBlock& block, double late_s, RunOfModel& run,
-                                 const Stop& stop) const;
   void Compare(const RowBlock& block, Matrix& outputs) const;
 
   const ResolvedProblem& problem_;
-  const SampleStore& store_;
-  const std::vector<ChannelNoise>& noise_;
+  RecordPass pass_;
 };
 
 }  // namespace polyest::internal
