@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/common/status.h"
+#include "core/estimator/expansion/likelihood_power.h"
 #include "core/estimator/posterior/mixture_weighing.h"
 
 namespace polyest::internal {
@@ -151,9 +152,12 @@ absl::Status ComponentMixture::Weigh(const Stop& stop) {
 }
 
 // Replaces the components by a single one if its expansion represents the posterior as well.
-// `particles` are those of each component.
+// `particles` are those of each component. It waits until no single sample can raise a piece of
+// the posterior that is too light to have particles.
 absl::Status ComponentMixture::Unite(const std::vector<Matrix>& particles, const Stop& stop) {
   if (components_.size() < 2) return absl::OkStatus();
+  const MixtureComponent& first = *components_.front();
+  if (PowerOfFirstSamples(first.problem(), first.rows_taken()) < 1) return absl::OkStatus();
   std::vector<double> weights;
   for (const auto& component : components_) weights.push_back(component->weight());
   const std::optional<Piece> whole = UnitePieces(particles, weights);

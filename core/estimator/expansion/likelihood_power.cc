@@ -58,6 +58,12 @@ bool Confirmed(const Points& points, double beta, double inflation, double effec
 
 }  // namespace
 
+double PowerOfFirstSamples(const ResolvedProblem& problem, int64_t rows) {
+  if (problem.dimension() <= kFewDimensions) return 1;
+  const auto samples = static_cast<double>(rows * problem.channels());
+  return std::min(1.0, samples / (2 * (problem.dimension() + 2.0)));
+}
+
 double LikelihoodPower(const RegionalExpansion& expansion, const Cost& cost) {
   if (LargestShift(expansion, cost.power()) <= kMaxShift) return cost.power();
   if (expansion.design().checks_are_draws &&

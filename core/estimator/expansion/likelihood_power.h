@@ -13,8 +13,19 @@
 // large noise to the true one.
 
 #include "core/estimator/expansion/regional_expansion.h"
+#include "core/estimator/problem/resolved_problem.h"
 
 namespace polyest::internal {
+
+// In at most so many dimensions elements reliably find the pieces of a posterior that particles
+// overlook.
+inline constexpr int kFewDimensions = 3;
+
+// Returns the power at which a contraction after `rows` rows keeps what the next samples can still
+// make likely. While there are fewer than 2 (n + 2) samples, one that comes may weigh as much as
+// all before, and raise a piece of the posterior from a thousandth to several per cent. 1 in few
+// dimensions, in which elements follow such pieces.
+double PowerOfFirstSamples(const ResolvedProblem& problem, int64_t rows);
 
 // Returns β, at most the power that the cost already has, and that when the expansion is accurate:
 // when LargestShift (model_agreement.h) is at most ½, or when check points drawn from a posterior

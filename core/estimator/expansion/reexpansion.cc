@@ -26,9 +26,6 @@ constexpr double kPays = 0.5;  // volume ratio: a move that saves less is not ma
 constexpr double kMaxErrorOfRaised = 0.05;
 // The error of an order of which no expansion can be made.
 constexpr double kMostError = std::numeric_limits<double>::max();
-// In at most so many dimensions elements reliably find the pieces of a posterior that particles
-// overlook.
-constexpr int kFewDimensions = 3;
 // Fraction of the particles that stands for a minimum that the sampler overlooked: enough for a
 // piece of the posterior to be found there.
 constexpr double kShareOfOverlooked = 0.03;
@@ -157,21 +154,11 @@ class Settler {
     return discount / std::max(samples - discount, std::numeric_limits<double>::min());
   }
 
-  // Returns the power at which a contraction keeps what the next samples can still make likely.
-  // While there are fewer than 2 (n + 2) samples, one that comes may weigh as much as all before,
-  // and raise a piece of the posterior from a thousandth to several per cent. In few dimensions
-  // elements follow such pieces.
-  double PowerOfFirstSamples() const {
-    const ResolvedProblem& problem = *request_.problem;
-    if (problem.dimension() <= kFewDimensions) return 1;
-    const auto samples = static_cast<double>(request_.rows * problem.channels());
-    return std::min(1.0, samples / (2 * (problem.dimension() + 2.0)));
-  }
-
   // Returns false when the sampler finds no starting point.
   absl::StatusOr<bool> Sample(int attempt) {
     Cost cost = expansion().MakeCost(request_.problem->problem().regularization);
-    power_ = std::min(LikelihoodPower(expansion(), cost), PowerOfFirstSamples());
+    power_ = std::min(LikelihoodPower(expansion(), cost),
+                      PowerOfFirstSamples(*request_.problem, request_.rows));
     cost.set_power(power_);
     absl::StatusOr<Particles> particles =
         SampleForSettlement(cost, expansion().design(), result_.particles,
