@@ -33,6 +33,7 @@ set -euo pipefail
 
 root="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
 cd "$root"
+python=/usr/bin/python3  # Debian's, which finds the packages that scripts import
 all_steps=(crashes damages attacks soak sanitized fuzz threads calibration properties adversary invariances
   python sbibm can cluster package)
 
@@ -56,11 +57,11 @@ attacks() {
   cmake --build --preset release --parallel "$(nproc)" --target polyestd
   local attack
   for attack in connections descriptors continuation; do
-    python3 -B tests/attack/strangers.py build/release/bin/polyestd "$attack" --seconds 20
+    "$python" -B tests/attack/strangers.py build/release/bin/polyestd "$attack" --seconds 20
   done
-  python3 -B tests/attack/tenants.py build/release/bin/polyestd --seconds 20
+  "$python" -B tests/attack/tenants.py build/release/bin/polyestd --seconds 20
   for attack in connections resets continuation; do
-    python3 -B tests/attack/strangers.py build/release/bin/polyestd "$attack" --seconds 20 \
+    "$python" -B tests/attack/strangers.py build/release/bin/polyestd "$attack" --seconds 20 \
       --edge deploy/edge/edge.cfg
   done
 }
@@ -69,7 +70,7 @@ soak() {
   deploy/install-packages.sh --tests
   cmake --preset release -DPOLYEST_BUILD_TESTS=ON
   cmake --build --preset release --parallel "$(nproc)" --target polyestd
-  python3 -B tests/soak/soak.py build/release/bin/polyestd --minutes "$soak_minutes"
+  "$python" -B tests/soak/soak.py build/release/bin/polyestd --minutes "$soak_minutes"
 }
 
 sanitized() { tests/run.sh --preset asan-ubsan --target polyest_long_tests --label long; }
@@ -101,7 +102,7 @@ adversary() {
   cmake --preset release -DPOLYEST_BUILD_TESTS=ON
   cmake --build --preset release --parallel "$(nproc)" --target polyest
   # 77: the cases' maker is not there, as the step has said.
-  python3 -B tests/adversary/run.py build/release/bin/polyest build/release/adversary ||
+  "$python" -B tests/adversary/run.py build/release/bin/polyest build/release/adversary ||
     [[ $? -eq 77 ]]
 }
 
@@ -109,7 +110,7 @@ invariances() {
   cmake --preset release -DPOLYEST_BUILD_TESTS=ON
   cmake --build --preset release --parallel "$(nproc)" --target polyest
   # 77: the measured records are not there, as the step has said.
-  python3 -B tests/invariances/run.py build/release/bin/polyest build/release/invariances ||
+  "$python" -B tests/invariances/run.py build/release/bin/polyest build/release/invariances ||
     [[ $? -eq 77 ]]
 }
 
@@ -117,7 +118,7 @@ python() {
   deploy/install-packages.sh --tests
   cmake --preset release -DPOLYEST_BUILD_TESTS=ON
   cmake --build --preset release --parallel "$(nproc)" --target polyestd polyest polyest_python
-  tests/python/versions.sh /usr/bin/python3 build/release
+  tests/python/versions.sh "$python" build/release
 }
 
 sbibm() {
@@ -140,11 +141,11 @@ cluster() {
   cmake --preset release -DPOLYEST_BUILD_TESTS=ON
   cmake --build --preset release --parallel "$(nproc)" --target polyestd polyest postgres_test
   POLYEST_TEST_ROUNDS=3000 build/release/bin/postgres_test --gtest_filter='FalseNodeTest.*'
-  python3 -B tests/cluster/faults.py build/release/bin/polyestd build/release/bin/polyest --faults 100 \
+  "$python" -B tests/cluster/faults.py build/release/bin/polyestd build/release/bin/polyest --faults 100 \
     --bound
   # 77: a program is missing, as the step has said.
   tests/cluster/patroni.sh build/release/bin/polyestd build/release/bin/polyest || [[ $? -eq 77 ]]
-  python3 -B tests/cluster/archive.py build/release/bin/polyestd build/release/bin/polyest ||
+  "$python" -B tests/cluster/archive.py build/release/bin/polyestd build/release/bin/polyest ||
     [[ $? -eq 77 ]]
 }
 

@@ -5,6 +5,7 @@
 #include <absl/strings/numbers.h>
 #include <grpcpp/generic/async_generic_service.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cstdlib>
 #include <map>
@@ -261,8 +262,9 @@ TEST_F(FalseNodeTest, ServesWhateverIsSaidOfACaller) {
   }
   node.process().Signal(SIGTERM);
   EXPECT_EQ(node.process().Wait(), 0);
-  // Each line is one of the daemon's own: nothing that was said has begun another one.
-  EXPECT_GE(std::ssize(JsonLines(node.process().Errors())), Rounds());
+  // Each line is one of the daemon's own: nothing that was said has begun another one. Refusals
+  // beyond the first fifty may have none.
+  EXPECT_GE(std::ssize(JsonLines(node.process().Errors())), std::min(Rounds(), 50));
 }
 
 }  // namespace
