@@ -121,6 +121,31 @@ TEST(Elements, FindEveryAliasOfRegularSamples) {
   EXPECT_THAT(Message(estimate, DiagnosticCode::kMultipleMinima), HasSubstr("10 separated pieces"));
 }
 
+// A released oscillator of about one period in two samples. With the samples' noise, k = 46 and its
+// image k = 82 have shares that first samples in four unknowns do not tell well.
+TEST(Elements, KeepTheImageOfAVibrationInFourUnknowns) {
+  const std::vector<UncertainParameter> uncertain = {
+      UncertainParameter::Lognormal("k", 41.5, 11.6).value(),
+      UncertainParameter::Lognormal("c", 0.352, 0.179).value(),
+      UncertainParameter::Normal("x", 1, 0.277).value(),
+      UncertainParameter::Normal("v", 0, 0.587).value()};
+  const Problem problem = TextProblem(
+      "exp(-c*t/2)*(x*cos(sqrt(k - c^2/4)*t) + (v + c*x/2)/sqrt(k - c^2/4)"
+      "*sin(sqrt(k - c^2/4)*t))",
+      uncertain, 0.4);
+  Samples samples;
+  samples.columns = {{"y",
+                      {-1.853, 0.959, 0.075, -0.457, 0.739,  -1.831, 0.782,  -0.141,
+                       0.378,  0.581, 0.253, 0.059,  -0.393, 0.579,  -0.562, 0.374,
+                       -0.085, 0.390, 0.783, -1.000, 1.151,  -0.158, -0.065, -0.809},
+                      {}}};
+  for (int i = 1; i <= 24; ++i) samples.time_s.push_back(0.397 * i);
+  const ParameterEstimate k = EstimateFrom(problem, samples).parameters.front();
+  // On a grid over k and c, with x and v integrated in closed form.
+  EXPECT_NEAR(k.mean, 46.81, 0.1 * 5.62);
+  EXPECT_NEAR(k.posterior_std_dev, 5.62, 0.1 * 5.62);
+}
+
 TEST(Elements, FollowTheNoiseWhileItIsLearned) {
   const Samples samples = CosineAt(IrregularTimes(5), 4.4, 5);
   const Moments exact = ExactOf(samples);
