@@ -111,7 +111,7 @@ RunTerm MixtureTerm(double mean, const ScoreMixture& shape, const RunScore& popu
   return result;
 }
 
-double NormalProbability(double z) { return 0.5 * std::erfc(-z / std::numbers::sqrt2); }
+double StandardNormalCdf(double z) { return 0.5 * std::erfc(-z / std::numbers::sqrt2); }
 
 }  // namespace
 
@@ -146,7 +146,7 @@ double QuantileInPopulation(const RunScore& alone, const ScoreMixture& shape,
     const double middle = 0.5 * (lower + upper);
     double below = 0;
     for (Eigen::Index k = 0; k < centres.size(); ++k) {
-      below += shares[k] * NormalProbability((middle - centres[k]) / deviation);
+      below += shares[k] * StandardNormalCdf((middle - centres[k]) / deviation);
     }
     (below < probability ? lower : upper) = middle;
   }

@@ -15,7 +15,7 @@ namespace {
 // The limit beyond which the density underflows: e^{−38²/2} ≈ 10⁻³¹⁴.
 constexpr double kReach = 38;
 constexpr double kPanel = 1;
-constexpr int kNodesForDensity = 20;
+constexpr int kNodesForNormalDensity = 20;
 constexpr int kMaxSteps = 200;
 constexpr double kConverged = 1e-9;  // the error left by Newton's method is its square
 
@@ -25,7 +25,7 @@ double Density(double x) {
 
 // Returns ∫_a^b φ by Gauss–Legendre quadrature; requires b − a ≤ kPanel.
 double PanelProbability(double a, double b) {
-  static const GaussRule rule = MakeGaussRule(Germ::Uniform(), kNodesForDensity);
+  static const GaussRule rule = MakeGaussRule(Germ::Uniform(), kNodesForNormalDensity);
   const double middle = 0.5 * (a + b), half = 0.5 * (b - a);
   double sum = 0;
   for (Eigen::Index i = 0; i < rule.nodes.size(); ++i) {
@@ -85,7 +85,7 @@ double TruncatedNormalQuantile(double a, double b, double p) {
 
 RecurrenceCoefficients TruncatedNormalRecurrence(double a, double b, int count) {
   POLYEST_CHECK(a < b && count >= 1 && count <= Germ::kMaxTruncatedNormalOrder + 1);
-  return StieltjesRecurrence(Discretize(a, b, count + kNodesForDensity), count);
+  return StieltjesRecurrence(Discretize(a, b, count + kNodesForNormalDensity), count);
 }
 
 }  // namespace polyest::internal

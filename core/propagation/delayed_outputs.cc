@@ -13,11 +13,11 @@ namespace polyest::internal {
 namespace {
 
 constexpr size_t kStencil = 6;
-constexpr size_t kCoarse = 4;          // nodes of p̃
-constexpr double kErrorFactor = 3;     // of D √(D/Y), at the end of the record
-constexpr double kFirst = 1.0 / 32;    // the first spacing, of an interval between times
-constexpr double kLeast = 1.0 / 1024;  // the least one
-constexpr double kMaxGrowth = 1.2;     // per node, so that neighbours are about equally far apart
+constexpr size_t kCoarse = 4;               // nodes of p̃
+constexpr double kErrorFactor = 3;          // of D √(D/Y), at the end of the record
+constexpr double kFirstSpacing = 1.0 / 32;  // the first spacing, of an interval between times
+constexpr double kLeast = 1.0 / 1024;       // the least one
+constexpr double kMaxGrowth = 1.2;  // per node, so that neighbours are about equally far apart
 constexpr double kMaxShrinkage = 0.5;
 constexpr double kSafety = 0.8;
 constexpr double kTooClose = 0.25;  // spacings: a node so near the end of the record is left out
@@ -78,8 +78,8 @@ absl::Status DelayedOutputs::AddNodes(double latest_s, double limit_s, const Sto
   if (std::exchange(has_replaced_, false)) nodes_.push_back(std::move(replaced_));
   if (nodes_.empty()) POLYEST_RETURN_IF_ERROR(AddNode(0, stop));
   double interval_s = *std::ranges::max_element(intervals_s_);
-  if (interval_s == 0) interval_s = kFirst * std::max(largest_delay_s_, -least_delay_s_);
-  if (spacing_s_ == 0) spacing_s_ = kFirst * interval_s;
+  if (interval_s == 0) interval_s = kFirstSpacing * std::max(largest_delay_s_, -least_delay_s_);
+  if (spacing_s_ == 0) spacing_s_ = kFirstSpacing * interval_s;
   if (latest_s == 0) return absl::OkStatus();
   while (nodes_.size() < kStencil / 2 || nodes_[nodes_.size() - kStencil / 2].time_s < latest_s) {
     spacing_s_ = std::clamp(spacing_s_, kLeast * interval_s, interval_s);

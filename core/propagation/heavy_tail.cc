@@ -7,7 +7,7 @@ namespace polyest::internal {
 namespace {
 
 // The first node in log λ and the step for ν = 4; for a larger ν they are closer to 0.
-constexpr double kFirst = -10, kStep = 0.5;
+constexpr double kFirstNode = -10, kStep = 0.5;
 // The density relative to that at 0 from which on its logarithm is taken without log1p.
 constexpr double kFarOff = 1e-3;
 
@@ -18,7 +18,7 @@ HeavyTail::HeavyTail(double degrees_of_freedom) {
   const double narrower = std::min(1.0, std::sqrt(kTailDegreesOfFreedom / degrees_of_freedom));
   double sum = 0;
   for (size_t k = 0; k < kNodes; ++k) {
-    const double s = narrower * (kFirst + kStep * static_cast<double>(k));
+    const double s = narrower * (kFirstNode + kStep * static_cast<double>(k));
     // λ^{ν/2} e^{−νλ/2}, relative to its largest value
     nodes_[k] = {std::exp(-s), std::exp(half * (s - std::expm1(s)))};
     sum += nodes_[k].probability;

@@ -15,7 +15,7 @@
 namespace polyest::internal {
 namespace {
 
-constexpr int64_t kRowsAtOnce = 256;
+constexpr int64_t kRowsToRead = 256;
 
 // The pairs: the first half of the trajectories or filters begins in their own states, the second
 // half in those of the polynomials.
@@ -37,8 +37,8 @@ class StatePairs {
     PairComparison comparison;
     int64_t samples = 0;
     Vector sums = Vector::Zero(checks());
-    for (int64_t first = kept_.absorbed.rows; first < rows; first += kRowsAtOnce) {
-      POLYEST_RETURN_IF_ERROR(store_.Read(first, std::min(kRowsAtOnce, rows - first), block));
+    for (int64_t first = kept_.absorbed.rows; first < rows; first += kRowsToRead) {
+      POLYEST_RETURN_IF_ERROR(store_.Read(first, std::min(kRowsToRead, rows - first), block));
       const int count = RowsOfRun(block);
       if (count == 0) break;
       Matrix outputs(2 * checks(), count * problem_.channels());

@@ -11,7 +11,7 @@
 
 #include "tests/unit/core/estimator/text_problem.h"
 
-namespace polyest::internal {
+namespace polyest::internal::undersampling_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -91,4 +91,4 @@ TEST(Aliasing, IsNotWithEightSamplesAPeriod) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::undersampling_test

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <random>
 
-namespace polyest::internal {
+namespace polyest::internal::residual_scatter_test {
 namespace {
 
 constexpr int kRows = 20'000;
@@ -60,4 +60,4 @@ TEST(ResidualScatter, SkipsMissingSamplesAndTheStepsBetweenRuns) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::residual_scatter_test
