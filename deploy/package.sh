@@ -52,7 +52,7 @@ build() { # LEVEL TARGET...
     export DEB_BUILD_MAINT_OPTIONS="hardening=+all" DEB_LDFLAGS_MAINT_APPEND=-Wl,-z,defs
     cmake -S "$root" -B "$work/$level" -G Ninja \
       -D CMAKE_BUILD_TYPE=Release \
-      -D CMAKE_UNITY_BUILD=ON \
+      -D CMAKE_UNITY_BUILD=ON -D CMAKE_UNITY_BUILD_BATCH_SIZE=16 \
       -D CMAKE_CXX_FLAGS="$(dpkg-buildflags --get CXXFLAGS) $(dpkg-buildflags --get CPPFLAGS)" \
       -D CMAKE_EXE_LINKER_FLAGS="$(dpkg-buildflags --get LDFLAGS)" \
       -D CMAKE_SHARED_LINKER_FLAGS="$(dpkg-buildflags --get LDFLAGS)" \
