@@ -135,6 +135,10 @@ class ModelMismatch {
       for (Eigen::Index row = 0; row < block.count(); ++row) {
         AddRow(block, row, outputs.middleCols(row * m, m), sums);
       }
+      // The model fails at such a point, even if nothing is measured from then on.
+      for (Eigen::Index i = 0; i < outputs.rows(); ++i) {
+        if (outputs.row(i).hasNaN()) sums.chi_squared.row(i).setConstant(kInfinity);
+      }
     };
     POLYEST_RETURN_IF_ERROR(pass_.Run(thetas, rows_, /*late_s=*/0, add, stop));
     EndRun(sums);
@@ -143,7 +147,8 @@ class ModelMismatch {
 
  private:
   // With u_k a residual in units of its noise: Σ u_k², Σ (u_k − u_{k−1})² and the last u_k, by
-  // point and channel, and the number of samples by channel. NaN from a point's failure on.
+  // point and channel, and the number of samples by channel. Of a point that fails they are not
+  // finite.
   struct Sums {
     Matrix chi_squared, differences, previous;
     Vector samples;

@@ -344,6 +344,13 @@ TEST(CostGrid, IsInfiniteWhereTheModelFails) {
   EXPECT_TRUE(std::isfinite(grid.mismatch(2, 0)));
   EXPECT_EQ(grid.mismatch(3, 0), kInfinity);
   EXPECT_EQ(grid.total(4, 0), kInfinity);
+
+  // It fails after the last sample, in a row without any.
+  Samples samples = ThreeRows();
+  samples.columns[0].missing = {false, false, true};
+  const CostGrid later = EvaluateCostGrid(Resolve(problem), samples, options, {}).value();
+  EXPECT_TRUE(std::isfinite(later.mismatch(2, 0)));
+  EXPECT_EQ(later.mismatch(3, 0), kInfinity);
 }
 
 TEST(CostGrid, RefusalNamesFieldValueAndRule) {
