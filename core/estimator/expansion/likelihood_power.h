@@ -21,10 +21,10 @@ namespace polyest::internal {
 // overlook.
 inline constexpr int kFewDimensions = 3;
 
-// Returns the power at which a contraction after `rows` rows keeps what the next samples can still
-// make likely. While there are fewer than 2 (n + 2) samples, one that comes may weigh as much as
-// all before, and raise a piece of the posterior from a thousandth to several per cent. 1 in few
-// dimensions, in which elements follow such pieces.
+// Returns the power of the likelihood at which a contraction after `rows` rows keeps what the next
+// samples can still make likely. While there are fewer than 2 (n + 2) samples, one that comes may
+// weigh as much as all before, and raise a piece of the posterior from a thousandth to several per
+// cent. The power is 1 in few dimensions, in which elements follow such pieces.
 double PowerOfFirstSamples(const ResolvedProblem& problem, int64_t rows);
 
 // Returns β, at most the power that the cost already has, and that when the expansion is accurate:
