@@ -62,8 +62,10 @@ class LaneModel final : public StateSpaceModel {
     }
   }
 
-  void Derivatives(double time_s, const ConstBlock& states, const ConstBlock& parameters,
-                   const ConstBlock& inputs, Block derivatives) const override {
+  // `flatten`: a call of the equations would pass everything through memory.
+  [[gnu::flatten]] void Derivatives(double time_s, const ConstBlock& states,
+                                    const ConstBlock& parameters, const ConstBlock& inputs,
+                                    Block derivatives) const override {
     CheckParameters(parameters);
     if constexpr (Equations::kStates > 0) {
       CheckShape(states, parameters.rows(), Equations::kStates);
@@ -79,8 +81,9 @@ class LaneModel final : public StateSpaceModel {
     }
   }
 
-  void Outputs(double time_s, const ConstBlock& states, const ConstBlock& parameters,
-               const ConstBlock& inputs, Block outputs) const override {
+  [[gnu::flatten]] void Outputs(double time_s, const ConstBlock& states,
+                                const ConstBlock& parameters, const ConstBlock& inputs,
+                                Block outputs) const override {
     CheckParameters(parameters);
     CheckShape(states, parameters.rows(), Equations::kStates);
     CheckShape(inputs, parameters.rows(), Equations::kInputs);

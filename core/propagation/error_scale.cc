@@ -5,6 +5,15 @@
 #include <limits>
 
 namespace polyest::internal {
+namespace {
+
+// Returns the larger norm, kHuge in place of a larger or undefined `ratio`.
+inline double LargerNorm(double norm, double ratio) {
+  const double finite = ratio < ErrorScale::kHuge ? ratio : ErrorScale::kHuge;
+  return norm > finite ? norm : finite;
+}
+
+}  // namespace
 
 ErrorScale::ErrorScale(Eigen::Index points, Eigen::Index states, double relative_tolerance)
     : relative_tolerance_(relative_tolerance),
@@ -29,10 +38,11 @@ void ErrorScale::SetScale(Eigen::Index state) {
 }
 
 void ErrorScale::Grow(const Eigen::ArrayXXd& states) {
-  // Nothing changes unless a state exceeds its largest magnitude so far.
-  if (states.size() == 0 || !((states.abs() - largest_).maxCoeff() > 0)) return;
-  largest_ = largest_.max(states.abs());
+  if (states.rows() == 0) return;
   for (Eigen::Index s = 0; s < states.cols(); ++s) {
+    // Nothing changes unless the state exceeds its largest magnitude so far.
+    if (!((states.col(s).abs() - largest_.col(s)).maxCoeff() > 0)) continue;
+    largest_.col(s) = largest_.col(s).max(states.col(s).abs());
     block_scale_(s) = largest_.col(s).maxCoeff();
     SetScale(s);
   }
@@ -75,24 +85,24 @@ double ErrorScale::WeightedNorm(const Eigen::ArrayXXd& error, const Eigen::Array
   for (Eigen::Index s = 0; s < error.cols(); ++s) {
     const double* const e = error.data() + s * points;
     const double* const w = weights.data() + s * points;
-    for (Eigen::Index p = 0; p < points; ++p) {
-      const double ratio = std::abs(e[p]) * w[p];
-      const double finite = ratio < kHuge ? ratio : kHuge;  // NaN also becomes kHuge
-      norm[p] = norm[p] > finite ? norm[p] : finite;
-    }
+    for (Eigen::Index p = 0; p < points; ++p) norm[p] = LargerNorm(norm[p], std::abs(e[p]) * w[p]);
   }
   return point_norm_.maxCoeff();
 }
 
 double ErrorScale::GrowingNorm(const Eigen::ArrayXXd& error) {
   const Eigen::Index points = error.rows();
-  point_norm_.setZero();
+  double* const norm = point_norm_.data();
+  std::fill_n(norm, points, 0.0);
   for (Eigen::Index s = 0; s < error.cols(); ++s) {
+    const double* const e = error.data() + s * points;
+    const double* const x = watched_->data() + s * points;
+    const double* const known = scale_.data() + s * points;
     for (Eigen::Index p = 0; p < points; ++p) {
-      const double magnitude = relative_tolerance_ * std::abs((*watched_)(p, s));
       // |e_ps| / max(rtol · S_ps + floor_s, rtol · |x_ps|)
-      const double ratio = std::abs(error(p, s)) / std::max(scale_(p, s), magnitude);
-      point_norm_(p) = std::max(point_norm_(p), ratio < kHuge ? ratio : kHuge);
+      const double present = relative_tolerance_ * std::abs(x[p]);
+      const double scale = known[p] > present ? known[p] : present;
+      norm[p] = LargerNorm(norm[p], std::abs(e[p]) / scale);
     }
   }
   return point_norm_.maxCoeff();

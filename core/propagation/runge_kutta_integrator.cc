@@ -215,19 +215,24 @@ double RungeKuttaIntegrator::Try(double step_s, double next_s) {
 }
 
 double RungeKuttaIntegrator::Error5(double step_s) {
-  for (Eigen::Index i = 0; i < error_.size(); i += kLanes) {
-    Lane::Map(error_.data() + i) = step_s * Sum<ErrorRow<DormandPrince5::kE>>(stages_, i);
-  }
+  const StageSum<ErrorRow<DormandPrince5::kE>> sum(stages_);
+  double* const error = error_.data();
+  const Eigen::Index size = error_.size();
+  for (Eigen::Index i = 0; i < size; i += kLanes) Lane::Map(error + i) = step_s * sum.At(i);
   return scale_.Norm(error_, scale_.weights());
 }
 
 double RungeKuttaIntegrator::Error8(double step_s) {
   constexpr double kShare = 0.1;  // of the estimate of order 3
-  for (Eigen::Index i = 0; i < error_.size(); i += kLanes) {
-    const Lane order5 = Sum<ErrorRow<DormandPrince8::kE5>>(stages_, i).abs();
-    const Lane order3 = kShare * Sum<ErrorRow<DormandPrince8::kE3>>(stages_, i).abs();
+  const StageSum<ErrorRow<DormandPrince8::kE5>> sum5(stages_);
+  const StageSum<ErrorRow<DormandPrince8::kE3>> sum3(stages_);
+  double* const error = error_.data();
+  const Eigen::Index size = error_.size();
+  for (Eigen::Index i = 0; i < size; i += kLanes) {
+    const Lane order5 = sum5.At(i).abs();
+    const Lane order3 = kShare * sum3.At(i).abs();
     const Lane largest = order5.max(order3).max(std::numeric_limits<double>::min());
-    Lane::Map(error_.data() + i) = step_s * order5 * (order5 / largest);
+    Lane::Map(error + i) = step_s * order5 * (order5 / largest);
   }
   return scale_.Norm(error_, scale_.weights());
 }
@@ -280,10 +285,10 @@ void RungeKuttaIntegrator::PrepareInterpolant() {
 template <const auto& kRows, int kFirst>
 void RungeKuttaIntegrator::SetInterpolant(double step_s) {
   const auto set = [&]<int kRow>() {
+    const StageSum<InterpolantRow<kRows, kRow>> sum(stages_);
     double* const values = interpolant_[kFirst + kRow].data();
-    for (Eigen::Index i = 0; i < states_.size(); i += kLanes) {
-      Lane::Map(values + i) = step_s * Sum<InterpolantRow<kRows, kRow>>(stages_, i);
-    }
+    const Eigen::Index size = states_.size();
+    for (Eigen::Index i = 0; i < size; i += kLanes) Lane::Map(values + i) = step_s * sum.At(i);
   };
   [&]<int... kRow>(std::integer_sequence<int, kRow...>) { (set.template operator()<kRow>(), ...); }
   (std::make_integer_sequence<int, std::size(kRows)>());

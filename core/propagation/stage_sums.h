@@ -51,22 +51,39 @@ constexpr auto NonzeroStages() {
   return stages;
 }
 
-// Returns Σ_j c_j k_j of the eight numbers from `i` on.
+// The sum Σ_j c_j k_j over the stages. It has their addresses, which the compiler would otherwise
+// load again after each number that is stored.
 template <class Row>
-Lane Sum(const Stages& stages, Eigen::Index i) {
-  static constexpr auto kNonzero = NonzeroStages<Row>();
-  return [&]<size_t... k>(std::index_sequence<k...>)->Lane {
-    return (... + (Row::At(kNonzero[k]) * Lane::Map(stages[kNonzero[k]].data() + i)));
+class StageSum {
+ public:
+  explicit StageSum(const Stages& stages) {
+    for (size_t k = 0; k < kNonzero.size(); ++k) stages_[k] = stages[kNonzero[k]].data();
   }
-  (std::make_index_sequence<kNonzero.size()>());
-}
+
+  // Returns the kLanes numbers of the sum from `i` on.
+  Lane At(Eigen::Index i) const { return At(i, std::make_index_sequence<kNonzero.size()>()); }
+
+ private:
+  static constexpr auto kNonzero = NonzeroStages<Row>();
+
+  template <size_t... k>
+  Lane At(Eigen::Index i, std::index_sequence<k...>) const {
+    return (... + (Row::At(kNonzero[k]) * Lane::Map(stages_[k] + i)));
+  }
+
+  std::array<const double*, kNonzero.size()> stages_;
+};
 
 // Writes x + h Σ_j c_j k_j.
 template <class Row>
 void AddStages(const Eigen::ArrayXXd& x, double step_s, const Stages& stages,
                Eigen::ArrayXXd& sums) {
-  for (Eigen::Index i = 0; i < x.size(); i += kLanes) {
-    Lane::Map(sums.data() + i) = Lane::Map(x.data() + i) + step_s * Sum<Row>(stages, i);
+  const StageSum<Row> sum(stages);
+  const double* const begin = x.data();
+  double* const end = sums.data();
+  const Eigen::Index size = x.size();
+  for (Eigen::Index i = 0; i < size; i += kLanes) {
+    Lane::Map(end + i) = Lane::Map(begin + i) + step_s * sum.At(i);
   }
 }
 
