@@ -131,7 +131,7 @@ Mismatch::Mismatch(const std::vector<ChannelSums>& channels)
 }
 
 double Mismatch::Evaluate(const ConstVectorRef& d) const {
-  double value = known_.ChiSquared(d) / 2;
+  double value = has_known() ? known_.ChiSquared(d) / 2 : 0;
   if (log_variance_.size() > 0) value += log_variance_.dot(d) + log_variance_at_reference_;
   for (const ChannelSums& channel : other_) {
     const double differences = channel.correlation_unknown ? channel.differences.ChiSquared(d) : 0;
@@ -142,8 +142,13 @@ double Mismatch::Evaluate(const ConstVectorRef& d) const {
 
 double Mismatch::EvaluateWithGradient(const ConstVectorRef& d, VectorRef gradient) const {
   // The gradient of a χ² is 2 (G d − b).
-  double value = known_.ChiSquaredWithGradient(d, gradient) / 2;
-  gradient /= 2;
+  double value = 0;
+  if (has_known()) {
+    value = known_.ChiSquaredWithGradient(d, gradient) / 2;
+    gradient /= 2;
+  } else {
+    gradient.setZero();
+  }
   if (log_variance_.size() > 0) {
     value += log_variance_.dot(d) + log_variance_at_reference_;
     gradient += log_variance_;
@@ -165,15 +170,21 @@ double Mismatch::EvaluateWithGradient(const ConstVectorRef& d, VectorRef gradien
 
 Matrix Mismatch::Curvature(const ConstVectorRef& d, const ConstMatrixRef& phi_gradient,
                            double spent) const {
-  Matrix curvature = phi_gradient.transpose() * (known_.G() * phi_gradient);
+  const Eigen::Index n = phi_gradient.cols();
+  Matrix curvature = Matrix::Zero(n, n);
+  if (has_known()) curvature = phi_gradient.transpose() * (known_.G() * phi_gradient);
   const double factor =
       std::max(0.1, 1 - spent / static_cast<double>(std::max<int64_t>(1, count_)));
   Vector gradient(d.size());
   for (const ChannelSums& channel : other_) {
     const double a = channel.samples.ChiSquaredWithGradient(d, gradient);
     const Vector by_a = phi_gradient.transpose() * gradient;
-    const double differences = channel.differences.ChiSquaredWithGradient(d, gradient);
-    const Vector by_d = phi_gradient.transpose() * gradient;
+    double differences = 0;
+    Vector by_d;
+    if (channel.correlation_unknown) {
+      differences = channel.differences.ChiSquaredWithGradient(d, gradient);
+      by_d = phi_gradient.transpose() * gradient;
+    }
     const Likelihood l = polyest::internal::Evaluate(channel, a, differences, factor);
     // Σ J_A ∂²A + J_AA ∂A ∂Aᵀ + …, with ∂²χ² = 2 G
     curvature += 2 * l.by_a * (phi_gradient.transpose() * (channel.samples.G() * phi_gradient)) +
@@ -204,7 +215,7 @@ void Mismatch::EvaluateMany(const ConstMatrixRef& differences, Matrix& product,
                             VectorRef values) const {
   const Factors& factors = FactorsOnce();
   values.setZero();
-  if (known_.count() > 0) {
+  if (has_known()) {
     factors.known.front().ChiSquaredMany(differences, product, values);
     values /= 2;
   }

@@ -85,6 +85,9 @@ class Mismatch {
   void EvaluateMany(const ConstMatrixRef& differences, Matrix& product, VectorRef values) const;
 
  private:
+  // Whether `known_` has samples; without, it is 0 everywhere.
+  bool has_known() const { return known_.count() > 0; }
+
   struct Factors;
   const Factors& FactorsOnce() const;
 
