@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
 #include <limits>
-#include <mutex>
 #include <utility>
 
 #include "core/bayes/factored_sums.h"
@@ -95,144 +95,160 @@ double ChannelSums::Lag1Correlation(const ConstVectorRef& d) const {
                               : LagCorrelation(samples.ChiSquared(d), differences.ChiSquared(d));
 }
 
-struct Mismatch::Factors {
-  std::once_flag once;
-  std::vector<FactoredSums> known;        // one
-  std::vector<FactoredSums> samples;      // of the other channels
-  std::vector<FactoredSums> differences;  // of those with unknown correlation; else not used
+struct Mismatch::Sums {
+  // A channel whose noise is not known. What is factored of it points to its sums.
+  struct Channel {
+    explicit Channel(const ChannelSums& channel_sums)
+        : sums(channel_sums), samples(&sums.samples, true), differences(&sums.differences, true) {}
+
+    ChannelSums sums;
+    FactoredSums samples;
+    FactoredSums differences;
+  };
+
+  explicit Sums(MismatchSums all_known) : known(std::move(all_known)), count(known.count()) {}
+
+  // Whether `known` has samples; without, it is 0 everywhere.
+  bool has_known() const { return known.count() > 0; }
+
+  MismatchSums known;  // of all channels with known noise
+  FactoredSums factored_known{&known, false};
+  // Their ½ Σ log(S_k/R_k) = lᵀd + lᵀφ_0, which may be below 0: l (S; empty if it is 0), and lᵀφ_0.
+  Vector log_variance;
+  double log_variance_at_reference = 0;
+  std::deque<Channel> others;
+  int64_t count = 0;  // of samples, over all channels
 };
 
-Mismatch::Mismatch(MismatchSums sums)
-    : known_(std::move(sums)), count_(known_.count()), factors_(std::make_shared<Factors>()) {
-  known_.Complete();
+Mismatch::Mismatch(MismatchSums known) {
+  auto sums = std::make_shared<Sums>(std::move(known));
+  sums->known.Complete();
+  sums_ = std::move(sums);
 }
 
-Mismatch::Mismatch(const std::vector<ChannelSums>& channels)
-    : known_(channels.empty() ? 0 : channels.front().samples.terms()),
-      factors_(std::make_shared<Factors>()) {
+Mismatch::Mismatch(const std::vector<ChannelSums>& channels) {
   POLYEST_CHECK(!channels.empty());
+  auto sums = std::make_shared<Sums>(MismatchSums(channels.front().samples.terms()));
   for (const ChannelSums& channel : channels) {
-    count_ += channel.samples.count();
+    sums->count += channel.samples.count();
     if (!channel.IsKnown()) {
       // Completed before they are copied and read, by several threads at once.
       channel.samples.Complete();
       channel.differences.Complete();
-      other_.push_back(channel);
+      sums->others.emplace_back(channel);
       continue;
     }
-    known_.Add(channel.samples);
+    sums->known.Add(channel.samples);
     if (channel.log_variance.size() > 0) {
-      if (log_variance_.size() == 0) log_variance_.setZero(known_.terms());
-      log_variance_ += channel.log_variance;
-      log_variance_at_reference_ += channel.log_variance_at_reference;
+      if (sums->log_variance.size() == 0) sums->log_variance.setZero(sums->known.terms());
+      sums->log_variance += channel.log_variance;
+      sums->log_variance_at_reference += channel.log_variance_at_reference;
     }
   }
-  known_.Complete();
+  sums->known.Complete();
+  sums_ = std::move(sums);
 }
 
+int Mismatch::terms() const { return sums_->known.terms(); }
+
 double Mismatch::Evaluate(const ConstVectorRef& d) const {
-  double value = has_known() ? known_.ChiSquared(d) / 2 : 0;
-  if (log_variance_.size() > 0) value += log_variance_.dot(d) + log_variance_at_reference_;
-  for (const ChannelSums& channel : other_) {
-    const double differences = channel.correlation_unknown ? channel.differences.ChiSquared(d) : 0;
-    value += polyest::internal::Evaluate(channel, channel.samples.ChiSquared(d), differences).value;
+  const Sums& sums = *sums_;
+  double value = sums.has_known() ? sums.factored_known.ChiSquared(d) / 2 : 0;
+  if (sums.log_variance.size() > 0) {
+    value += sums.log_variance.dot(d) + sums.log_variance_at_reference;
+  }
+  for (const Sums::Channel& channel : sums.others) {
+    const double differences =
+        channel.sums.correlation_unknown ? channel.differences.ChiSquared(d) : 0;
+    value +=
+        polyest::internal::Evaluate(channel.sums, channel.samples.ChiSquared(d), differences).value;
   }
   return value;
 }
 
 double Mismatch::EvaluateWithGradient(const ConstVectorRef& d, VectorRef gradient) const {
+  const Sums& sums = *sums_;
   // The gradient of a χ² is 2 (G d − b).
   double value = 0;
-  if (has_known()) {
-    value = known_.ChiSquaredWithGradient(d, gradient) / 2;
+  if (sums.has_known()) {
+    value = sums.factored_known.ChiSquaredWithGradient(d, gradient) / 2;
     gradient /= 2;
   } else {
     gradient.setZero();
   }
-  if (log_variance_.size() > 0) {
-    value += log_variance_.dot(d) + log_variance_at_reference_;
-    gradient += log_variance_;
+  if (sums.log_variance.size() > 0) {
+    value += sums.log_variance.dot(d) + sums.log_variance_at_reference;
+    gradient += sums.log_variance;
   }
   Vector by_samples(d.size()), by_differences(d.size());
-  for (const ChannelSums& channel : other_) {
+  for (const Sums::Channel& channel : sums.others) {
+    const bool correlation_unknown = channel.sums.correlation_unknown;
     const double a = channel.samples.ChiSquaredWithGradient(d, by_samples);
     double differences = 0;
-    if (channel.correlation_unknown) {
+    if (correlation_unknown) {
       differences = channel.differences.ChiSquaredWithGradient(d, by_differences);
     }
-    const Likelihood l = polyest::internal::Evaluate(channel, a, differences);
+    const Likelihood l = polyest::internal::Evaluate(channel.sums, a, differences);
     value += l.value;
     gradient += l.by_a * by_samples;
-    if (channel.correlation_unknown) gradient += l.by_d * by_differences;
+    if (correlation_unknown) gradient += l.by_d * by_differences;
   }
   return value;
 }
 
 Matrix Mismatch::Curvature(const ConstVectorRef& d, const ConstMatrixRef& phi_gradient,
                            double spent) const {
+  const Sums& sums = *sums_;
   const Eigen::Index n = phi_gradient.cols();
   Matrix curvature = Matrix::Zero(n, n);
-  if (has_known()) curvature = phi_gradient.transpose() * (known_.G() * phi_gradient);
+  if (sums.has_known()) curvature = sums.factored_known.Information(phi_gradient);
   const double factor =
-      std::max(0.1, 1 - spent / static_cast<double>(std::max<int64_t>(1, count_)));
+      std::max(0.1, 1 - spent / static_cast<double>(std::max<int64_t>(1, sums.count)));
   Vector gradient(d.size());
-  for (const ChannelSums& channel : other_) {
+  for (const Sums::Channel& channel : sums.others) {
+    const bool correlation_unknown = channel.sums.correlation_unknown;
     const double a = channel.samples.ChiSquaredWithGradient(d, gradient);
     const Vector by_a = phi_gradient.transpose() * gradient;
     double differences = 0;
     Vector by_d;
-    if (channel.correlation_unknown) {
+    if (correlation_unknown) {
       differences = channel.differences.ChiSquaredWithGradient(d, gradient);
       by_d = phi_gradient.transpose() * gradient;
     }
-    const Likelihood l = polyest::internal::Evaluate(channel, a, differences, factor);
+    const Likelihood l = polyest::internal::Evaluate(channel.sums, a, differences, factor);
     // Σ J_A ∂²A + J_AA ∂A ∂Aᵀ + …, with ∂²χ² = 2 G
-    curvature += 2 * l.by_a * (phi_gradient.transpose() * (channel.samples.G() * phi_gradient)) +
-                 l.by_aa * by_a * by_a.transpose();
-    if (!channel.correlation_unknown) continue;
     curvature +=
-        2 * l.by_d * (phi_gradient.transpose() * (channel.differences.G() * phi_gradient)) +
-        l.by_ad * (by_a * by_d.transpose() + by_d * by_a.transpose()) +
-        l.by_dd * by_d * by_d.transpose();
+        2 * l.by_a * channel.samples.Information(phi_gradient) + l.by_aa * by_a * by_a.transpose();
+    if (!correlation_unknown) continue;
+    curvature += 2 * l.by_d * channel.differences.Information(phi_gradient) +
+                 l.by_ad * (by_a * by_d.transpose() + by_d * by_a.transpose()) +
+                 l.by_dd * by_d * by_d.transpose();
   }
   return curvature;
 }
 
-const Mismatch::Factors& Mismatch::FactorsOnce() const {
-  std::call_once(factors_->once, [this] {
-    factors_->known.emplace_back(known_, /*relative=*/false);
-    for (const ChannelSums& channel : other_) {
-      factors_->samples.emplace_back(channel.samples, /*relative=*/true);
-      const bool needed = channel.correlation_unknown;
-      factors_->differences.emplace_back(needed ? channel.differences : MismatchSums(0),
-                                         /*relative=*/true);
-    }
-  });
-  return *factors_;
-}
-
 void Mismatch::EvaluateMany(const ConstMatrixRef& differences, Matrix& product,
                             VectorRef values) const {
-  const Factors& factors = FactorsOnce();
+  const Sums& sums = *sums_;
   values.setZero();
-  if (has_known()) {
-    factors.known.front().ChiSquaredMany(differences, product, values);
+  if (sums.has_known()) {
+    sums.factored_known.ChiSquaredMany(differences, product, values);
     values /= 2;
   }
-  if (log_variance_.size() > 0) {
-    values.noalias() += differences * log_variance_;
-    values.array() += log_variance_at_reference_;
+  if (sums.log_variance.size() > 0) {
+    values.noalias() += differences * sums.log_variance;
+    values.array() += sums.log_variance_at_reference;
   }
   thread_local Vector a, d;  // kept from call to call, so that a sampler's sweeps do not allocate
   a.resize(values.size());
   d.resize(values.size());
-  for (size_t c = 0; c < other_.size(); ++c) {
-    const bool correlation_unknown = other_[c].correlation_unknown;
-    factors.samples[c].ChiSquaredMany(differences, product, a);
-    if (correlation_unknown) factors.differences[c].ChiSquaredMany(differences, product, d);
+  for (const Sums::Channel& channel : sums.others) {
+    const bool correlation_unknown = channel.sums.correlation_unknown;
+    channel.samples.ChiSquaredMany(differences, product, a);
+    if (correlation_unknown) channel.differences.ChiSquaredMany(differences, product, d);
     for (Eigen::Index i = 0; i < values.size(); ++i) {
       values[i] +=
-          polyest::internal::Evaluate(other_[c], a[i], correlation_unknown ? d[i] : 0).value;
+          polyest::internal::Evaluate(channel.sums, a[i], correlation_unknown ? d[i] : 0).value;
     }
   }
 }

@@ -65,13 +65,14 @@ struct ChannelSums {
   double Lag1Correlation(const ConstVectorRef& d) const;
 };
 
+// Copies share the sums.
 class Mismatch {
  public:
   // Takes the sums of channels with known noise.
   Mismatch(MismatchSums sums);  // NOLINT(google-explicit-constructor): the plain case
   explicit Mismatch(const std::vector<ChannelSums>& channels);
 
-  int terms() const { return known_.terms(); }
+  int terms() const;
 
   // Returns J_mismatch at d = φ(η) − φ(η_0); `gradient` (S) is with respect to d.
   double Evaluate(const ConstVectorRef& d) const;
@@ -81,23 +82,13 @@ class Mismatch {
   Matrix Curvature(const ConstVectorRef& d, const ConstMatrixRef& phi_gradient,
                    double spent = 0) const;
   // Writes J_mismatch at W points into `values` (W); `differences` is W × S. `product` is scratch
-  // memory. The first call factors the sums (factored_sums.h), which costs O(S³) at most.
+  // memory.
   void EvaluateMany(const ConstMatrixRef& differences, Matrix& product, VectorRef values) const;
 
  private:
-  // Whether `known_` has samples; without, it is 0 everywhere.
-  bool has_known() const { return known_.count() > 0; }
+  struct Sums;
 
-  struct Factors;
-  const Factors& FactorsOnce() const;
-
-  MismatchSums known_;  // of all channels with known noise
-  // Their ½ Σ log(S_k/R_k) = lᵀd + lᵀφ_0, which may be below 0: l (S; empty if it is 0), and lᵀφ_0.
-  Vector log_variance_;
-  double log_variance_at_reference_ = 0;
-  std::vector<ChannelSums> other_;    // the rest
-  int64_t count_ = 0;                 // of samples, over all channels
-  std::shared_ptr<Factors> factors_;  // of all sums, for many points; shared by copies
+  std::shared_ptr<const Sums> sums_;
 };
 
 }  // namespace polyest::internal

@@ -43,9 +43,10 @@ NODES = 3
 FAULT_S, REST_S = (3.5, 6.0), (2.0, 4.0)
 # Usual and longest wait for the rigs to go on after that, and the pause between two looks, s.
 SETTLED_S, SETTLE_S, LOOK_S = 1.0, 30.0, 0.1
-# A silence of the rigs, s: after a fault of a daemon, and beyond one of the database.
+# A silence of the rigs, s: after a fault of a daemon, and beyond one of the database; and, after the
+# last fault, one that is taken for the end of a rig.
 DAEMON_SILENCE_S, DATABASE_SILENCE_S = 10.0, 5.0
-PATIENCE_S = 120.0
+PATIENCE_S = 30.0
 KINDS = ["daemon killed", "daemon stopped", "database cut from a daemon", "database silent to a daemon",
          "daemon cut from the others", "daemon silent to the others", "daemon cut from the rigs",
          "daemon silent to the rigs", "database crashed", "database stopped"]
@@ -83,10 +84,15 @@ class Rig:
                 yield first, end - begin
 
     def wait(self):
-        try:
-            self.process.wait(PATIENCE_S)
-        except subprocess.TimeoutExpired:
-            return "has not come to its end"
+        """Waits for the end of the recording while estimates come; returns what is wrong."""
+        ended = False
+        while not ended:
+            try:
+                self.process.wait(PATIENCE_S)
+                ended = True
+            except subprocess.TimeoutExpired:
+                if not self.has_gone_on(time.monotonic() - PATIENCE_S):
+                    return f"had no estimate for {PATIENCE_S:g} s"
         self._reader.join()
         return None if self.process.returncode == 0 else f"has failed: {self.process.returncode}"
 

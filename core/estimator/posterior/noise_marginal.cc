@@ -237,10 +237,9 @@ Vector NoiseMarginal::LogFactors(const ConstMatrixRef& etas) const {
   Vector factors = Vector::Zero(etas.rows());
   Matrix differences, product;
   for (const Channel& channel : channels_) {
-    const FactoredSums samples(channel.sums->samples, /*relative=*/true);
+    const FactoredSums samples(&channel.sums->samples, /*relative=*/true);
+    const FactoredSums lags(&channel.sums->differences, /*relative=*/true);
     const bool lagged = channel.sums->correlation_unknown;
-    const FactoredSums lags(lagged ? channel.sums->differences : MismatchSums(0),
-                            /*relative=*/true);
     for (Eigen::Index first = 0; first < etas.rows(); first += kBlock) {
       const Eigen::Index count = std::min(kBlock, etas.rows() - first);
       const Matrix block = etas.middleRows(first, count);

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -32,7 +33,7 @@ Vector ChiSquared(const FactoredSums& factored, const Matrix& points) {
 
 TEST(FactoredSums, HaveTheChiSquaredOfTheSums) {
   const MismatchSums sums = RandomSums(12, 100, 1, 1);
-  const FactoredSums factored(sums, false);
+  const FactoredSums factored(&sums, false);
   EXPECT_EQ(factored.rank(), 12);
   const Matrix points = Matrix::Random(5, 12);
   const Vector values = ChiSquared(factored, points);
@@ -44,7 +45,7 @@ TEST(FactoredSums, HaveTheChiSquaredOfTheSums) {
 
 TEST(FactoredSums, HaveAColumnPerSampleWhereSamplesAreFew) {
   const MismatchSums sums = RandomSums(60, 7, 1, 1);
-  const FactoredSums factored(sums, true);
+  const FactoredSums factored(&sums, true);
   EXPECT_EQ(factored.rank(), 7);
   const Matrix points = Matrix::Random(5, 60);
   const Vector values = ChiSquared(factored, points);
@@ -59,7 +60,7 @@ TEST(FactoredSums, HaveAColumnPerSampleWhereSamplesAreFew) {
 TEST(FactoredSums, LeaveOutATraceThatIsNegligible) {
   constexpr int kTerms = 30;
   const MismatchSums sums = RandomSums(kTerms, 1000, 0.3, 1);
-  const FactoredSums factored(sums, false);
+  const FactoredSums factored(&sums, false);
   EXPECT_LT(factored.rank(), 15);
   const Vector values = ChiSquared(factored, Matrix::Identity(kTerms, kTerms));
   double trace = 0;
@@ -77,15 +78,37 @@ TEST(FactoredSums, LeaveOutATraceThatIsNegligible) {
 TEST(FactoredSums, KeepWhatMattersRelativeToTheResiduals) {
   constexpr int kTerms = 30, kSamples = 1000;
   const MismatchSums sums = RandomSums(kTerms, kSamples, 0.3, 1e-5);
-  const FactoredSums absolute(sums, false), relative(sums, true);
+  const FactoredSums absolute(&sums, false), relative(&sums, true);
   EXPECT_GT(relative.rank(), absolute.rank() + 5);
   const Matrix point = Matrix::Constant(1, kTerms, 1e-5);
   const double expected = sums.ChiSquared(point.row(0).transpose());
   EXPECT_NEAR(ChiSquared(relative, point)[0] / expected, 1, 1e-6);
 }
 
+// Single points are evaluated through the factor where it has few columns, else through G; either
+// way by what the sums themselves say, the gradient of which is 2 (G d − b).
+TEST(FactoredSums, HaveTheValuesOfTheSumsAtSinglePoints) {
+  constexpr int kTerms = 120;
+  for (const int samples : {20, 300}) {
+    const MismatchSums sums = RandomSums(kTerms, samples, 1, 1);
+    const FactoredSums factored(&sums, true);
+    EXPECT_EQ(factored.rank(), std::min(samples, kTerms));
+    const Vector d = Vector::Random(kTerms);
+    Vector gradient(kTerms), expected_gradient(kTerms);
+    const double expected = sums.ChiSquaredWithGradient(d, expected_gradient);
+    EXPECT_NEAR(factored.ChiSquared(d), expected, 1e-12 * expected);
+    EXPECT_NEAR(factored.ChiSquaredWithGradient(d, gradient), expected, 1e-12 * expected);
+    EXPECT_LT((gradient - expected_gradient).norm(), 1e-12 * expected_gradient.norm());
+    const Matrix phi_gradient = Matrix::Random(kTerms, 3);
+    const Matrix information = phi_gradient.transpose() * sums.G() * phi_gradient;
+    EXPECT_LT((factored.Information(phi_gradient) - information).norm(),
+              1e-12 * information.norm());
+  }
+}
+
 TEST(FactoredSums, OfNoSamplesAreZero) {
-  const FactoredSums factored(MismatchSums(4), true);
+  const MismatchSums sums(4);
+  const FactoredSums factored(&sums, true);
   EXPECT_EQ(factored.rank(), 0);
   EXPECT_EQ(ChiSquared(factored, Matrix::Random(3, 4)), Vector::Zero(3));
 }
