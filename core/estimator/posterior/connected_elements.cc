@@ -27,8 +27,21 @@ double LeastAt(const Element::Bound& bound, const ElementCost& element) {
   return least && std::isfinite(least->value) ? least->value + element.height : kInfinity;
 }
 
+// Returns the cost of the element where the other one has its least, +∞ if the element does not
+// have that point or the expansion's box does not reach it.
+double CostWhereLeast(const ElementCost& other, const ElementCost& element) {
+  const Vector xi = other.design->region.ToGerm(other.minimum.point);
+  const Vector eta = element.design->region.ToLocal(xi);
+  Vector lower, upper;
+  SamplingBox(*element.design, lower, upper);
+  const bool reached = (eta.array() >= lower.array() && eta.array() <= upper.array()).all();
+  if (!reached || !element.design->element.Contains(xi)) return kInfinity;
+  return element.cost->Evaluate(eta).total + element.height;
+}
+
 bool AreConnected(const ElementCost& a, const ElementCost& b) {
   const double peak = std::max(a.minimum.value + a.height, b.minimum.value + b.height);
+  if (std::min(CostWhereLeast(a, b), CostWhereLeast(b, a)) < peak + kWallOfPiece) return true;
   for (const Element::Bound& bound : a.design->element.bounds()) {
     for (const Element::Bound& other : b.design->element.bounds()) {
       if (!bound.IsOpposite(other)) continue;

@@ -2,8 +2,10 @@
 
 // Which elements of a mixture belong to the same piece of the posterior. Two elements with a common
 // bound are connected if the cost somewhere on it is less than 8 above the higher of their least
-// costs: the density there is more than e^−8 of that peak. A piece consists of elements that are
-// connected with one another, directly or through others.
+// costs: the density there is more than e^−8 of that peak. Elements that a parameter of a run
+// divided overlap once the run has ended and the parameter is integrated out; they are connected if
+// one of them has so low a cost where the other has its least. A piece consists of elements that
+// are connected with one another, directly or through others.
 
 #include <vector>
 

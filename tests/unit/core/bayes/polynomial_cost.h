@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "core/bayes/cost.h"
@@ -19,7 +20,9 @@ struct Measurement {
 };
 
 // Returns J = ½ Σ ((z − y(ξ))/σ)² + J_apriori, exact because order 2 represents the outputs.
-inline Cost CostOf(const Prior& prior, const std::vector<Measurement>& measurements) {
+// Outside of the element it is +∞.
+inline Cost CostOf(const Prior& prior, const std::vector<Measurement>& measurements,
+                   Element element = Element()) {
   const auto basis = std::make_shared<const Basis>(prior.germs(), 2);
   const Matrix points = CollocationPoints(PointSet::kGaussTensor, prior.germs(), 2, 0).value();
   CollocationMatrix matrix = CollocationMatrix::Factor(*basis, points).value();
@@ -38,7 +41,8 @@ inline Cost CostOf(const Prior& prior, const std::vector<Measurement>& measureme
     const double variance = measurement.noise * measurement.noise;
     sums.Add(coefficients.col(0), measurement.z - coefficients.col(0).dot(phi_0), variance);
   }
-  return Cost(basis, Region::WholePrior(prior.dimension()), reference, sums, prior, 1);
+  return Cost(basis, Region::WholePrior(prior.dimension()), reference, sums, prior, 1,
+              std::move(element));
 }
 
 }  // namespace polyest::internal
