@@ -1,6 +1,7 @@
 #include "server/sessions/tenant_memory.h"
 
 #include <absl/strings/str_format.h>
+#include <malloc.h>
 
 #include <algorithm>
 #include <chrono>
@@ -64,7 +65,19 @@ void TenantMemory::Forget(int64_t session) {
   const auto tenant = tenants_.find(share->second.tenant);
   tenant->second -= share->second.bytes;
   if (tenant->second == 0) tenants_.erase(tenant);
+  left_bytes_ += share->second.bytes;
   sessions_.erase(share);
+}
+
+// The allocator would keep what was freed between blocks that are still in use, and a tenant that
+// creates session after session would take far more memory than its own.
+void TenantMemory::Trim() {
+  {
+    const std::lock_guard lock(mutex_);
+    if (left_bytes_ < max_mb_ * kBytesOfMebibyte / 2) return;
+    left_bytes_ = 0;
+  }
+  malloc_trim(0);
 }
 
 absl::Status TenantMemory::MakeRoom(const std::string& tenant, int64_t more) {
@@ -86,7 +99,11 @@ absl::Status TenantMemory::MakeRoom(const std::string& tenant, int64_t more) {
     if (excess <= 0) break;
     // Noted first, because the session may have left, and come back, before Submit returns.
     NoteLeaving(session->number(), true);
-    if (session->strand().Submit([session = session] { session->Unload(); }).ok()) {
+    const auto unload = [this, session = session] {  // which shares this object
+      session->Unload();
+      Trim();
+    };
+    if (session->strand().Submit(unload).ok()) {
       excess -= bytes;
     } else {  // the daemon is busy
       NoteLeaving(session->number(), false);

@@ -52,11 +52,15 @@ class TenantMemory {
   std::vector<std::pair<int64_t, std::shared_ptr<Session>>> Candidates(const std::string& tenant,
                                                                        int64_t& excess);
   void NoteLeaving(int64_t session, bool leaving);
+  // Gives the memory of sessions that have left back to the operating system, once they have held
+  // half of what a tenant may.
+  void Trim();
 
   const int64_t max_mb_;
   mutable std::mutex mutex_;
   std::map<int64_t, Share> sessions_;       // those that are loaded
   std::map<std::string, int64_t> tenants_;  // those that have any; bytes
+  int64_t left_bytes_ = 0;                  // held by sessions that have left since the last Trim
 };
 
 }  // namespace polyest::internal
