@@ -31,7 +31,7 @@ StraightCoordinates::StraightCoordinates(const Prior& prior, const Region& regio
     const bool positive = parameter.ToParameter(germ.Lower()) > 0;
     const bool negative = parameter.ToParameter(germ.Upper()) < 0;
     if (map == ParameterMap::kExponential && !positive && !negative) continue;
-    curved_.push_back({i, negative ? -1.0 : 1.0});
+    curved_.push_back({i, negative ? -1.0 : 1.0, !prior.IsCurved(i)});
   }
 }
 
@@ -40,12 +40,13 @@ void StraightCoordinates::FromLocal(const ConstMatrixRef& etas, Matrix& us,
   us = region_.ManyToGerm(etas);
   if (prior_.correlated()) us = (us * prior_.factor().transpose()).eval();
   log_volumes.setZero(us.rows());
-  for (const auto& [i, sign] : curved_) {
+  for (const Curved& curved : curved_) {
     for (Eigen::Index row = 0; row < us.rows(); ++row) {
-      const double z = us(row, i);
-      const double theta = prior_.OfScore(i, z);
-      us(row, i) = map_ == ParameterMap::kExponential ? std::log(sign * theta) : theta;
-      log_volumes[row] += LogSlope(i, z, theta);
+      double& u = us(row, curved.parameter);
+      const double z = u;
+      const double theta = prior_.OfScore(curved.parameter, z);
+      u = map_ == ParameterMap::kExponential ? std::log(curved.sign * theta) : theta;
+      log_volumes[row] += LogSlope(curved, z, u);
     }
   }
 }
@@ -54,21 +55,23 @@ void StraightCoordinates::ToLocal(const ConstMatrixRef& us, Matrix& etas,
                                   Vector& log_volumes) const {
   Matrix xis = us;
   log_volumes.setZero(us.rows());
-  for (const auto& [i, sign] : curved_) {
+  for (const Curved& curved : curved_) {
     for (Eigen::Index row = 0; row < us.rows(); ++row) {
-      const double u = us(row, i);
-      const double theta = map_ == ParameterMap::kExponential ? sign * std::exp(u) : u;
-      xis(row, i) = prior_.ScoreOf(i, theta);
-      log_volumes[row] += LogSlope(i, xis(row, i), theta);
+      const double u = us(row, curved.parameter);
+      const double theta = map_ == ParameterMap::kExponential ? curved.sign * std::exp(u) : u;
+      const double z = prior_.ScoreOf(curved.parameter, theta);
+      xis(row, curved.parameter) = z;
+      log_volumes[row] += LogSlope(curved, z, u);
     }
   }
   if (prior_.correlated()) xis = SolveLower(prior_.factor(), Matrix(xis.transpose())).transpose();
   etas = region_.ManyToLocal(xis);
 }
 
-double StraightCoordinates::LogSlope(int parameter, double z, double theta) const {
-  const double slope = prior_.SlopeOfScore(parameter, z);
-  return std::log((map_ == ParameterMap::kExponential ? std::abs(theta) : 1) / slope);
+double StraightCoordinates::LogSlope(const Curved& curved, double z, double u) const {
+  const double log_theta_slope = map_ == ParameterMap::kExponential ? u : 0;  // |dθ/du| = e^u or 1
+  if (curved.theta_is_affine) return log_theta_slope;
+  return log_theta_slope - std::log(prior_.SlopeOfScore(curved.parameter, z));
 }
 
 }  // namespace polyest::internal

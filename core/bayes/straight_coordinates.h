@@ -34,11 +34,12 @@ class StraightCoordinates {
  private:
   struct Curved {
     int parameter;
-    double sign;  // of θ, if u is its logarithm
+    double sign;           // of θ, if u is its logarithm
+    bool theta_is_affine;  // in the score z
   };
 
-  // Returns log |dz/du| where the parameter is θ and its score z.
-  double LogSlope(int parameter, double z, double theta) const;
+  // Returns log |dz/du| up to a constant of the parameter.
+  double LogSlope(const Curved& curved, double z, double u) const;
 
   const Prior& prior_;
   const Region& region_;
