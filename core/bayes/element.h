@@ -3,7 +3,8 @@
 // An element of the germ's space, as in multi-element polynomial chaos: a part of Ω that has an
 // expansion of its own. It is bounded by hyperplanes, each of which divided an element into two.
 // The elements that divisions leave cover Ω and have only hyperplanes in common, so that the
-// posterior's integral is the sum of theirs.
+// posterior's integral is the sum of theirs. Where the parameter of an ended run divided them and
+// has been integrated out, they overlap, and the posterior's density is the sum of theirs, too.
 //
 // Source: Wan & Karniadakis, Journal of Computational Physics 209 (2005), 617.
 
