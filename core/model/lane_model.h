@@ -62,7 +62,7 @@ class LaneModel final : public StateSpaceModel {
     }
   }
 
-  // `flatten`: a call of the equations would pass everything through memory.
+  // The equations are inlined (`flatten`): a call would pass all quantities through memory.
   [[gnu::flatten]] void Derivatives(double time_s, const ConstBlock& states,
                                     const ConstBlock& parameters, const ConstBlock& inputs,
                                     Block derivatives) const override {

@@ -69,8 +69,8 @@ void TenantMemory::Forget(int64_t session) {
   sessions_.erase(share);
 }
 
-// The allocator would keep what was freed between blocks that are still in use, and a tenant that
-// creates session after session would take far more memory than its own.
+// The allocator would keep what was freed between blocks that are still in use: a tenant that
+// creates session after session would make the daemon hold twice what the tenant may.
 void TenantMemory::Trim() {
   {
     const std::lock_guard lock(mutex_);
@@ -99,7 +99,7 @@ absl::Status TenantMemory::MakeRoom(const std::string& tenant, int64_t more) {
     if (excess <= 0) break;
     // Noted first, because the session may have left, and come back, before Submit returns.
     NoteLeaving(session->number(), true);
-    const auto unload = [this, session = session] {  // which shares this object
+    const auto unload = [this, session = session] {  // the session keeps this object alive
       session->Unload();
       Trim();
     };
