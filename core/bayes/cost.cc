@@ -11,6 +11,8 @@ namespace {
 
 // The number of points whose matrices are computed together, so that they stay in the cache.
 constexpr Eigen::Index kBlock = 128;
+// Operations for one point beside those that grow with the terms: basis, prior, region.
+constexpr int64_t kOtherOperations = 300;
 
 // Returns J_mismatch + α² J_apriori; for α² = 0 an infinite prior term has no effect.
 double Total(double mismatch, double prior, double regularization) {
@@ -134,7 +136,8 @@ void Cost::EvaluateMany(const ConstMatrixRef& etas, Vector& totals) const {
   POLYEST_CHECK(etas.cols() == dimension());
   totals.resize(etas.rows());
   const auto blocks = static_cast<int>((etas.rows() + kBlock - 1) / kBlock);
-  ParallelFor(blocks, threads_, [&](int block) {
+  const int64_t operations = etas.rows() * (basis_->size() * basis_->size() + kOtherOperations);
+  ParallelFor(blocks, ThreadsFor(operations, threads_), [&](int block) {
     const Eigen::Index first = block * kBlock;
     const Eigen::Index count = std::min(kBlock, etas.rows() - first);
     EvaluateBlock(etas.middleRows(first, count), totals.segment(first, count));

@@ -82,7 +82,9 @@ void CollocationMatrix::Solve(const ConstMatrixRef& values, MatrixRef coefficien
   POLYEST_CHECK(coefficients.cols() == values.cols() && residual_variance.size() == values.cols());
   ReserveResiduals(values.cols());
   const auto parts = static_cast<int>((values.cols() + kColumnsAtOnce - 1) / kColumnsAtOnce);
-  ParallelFor(parts, threads, [&](int part) {
+  // Qᵀ Y, R⁻¹ (Qᵀ Y) and A c
+  const int64_t operations = int64_t{terms()} * (4 * points() + terms()) * values.cols();
+  ParallelFor(parts, ThreadsFor(operations, threads), [&](int part) {
     const Eigen::Index first = part * kColumnsAtOnce;
     const Eigen::Index count = std::min(kColumnsAtOnce, values.cols() - first);
     SolveSome(values.middleCols(first, count), coefficients.middleCols(first, count),

@@ -65,13 +65,14 @@ ThreadPool& ThreadPool::OfProcess() {
 void ThreadPool::Run(int items, int threads, absl::FunctionRef<void(int)> work) {
   const Computing here;
   Loop loop{work, items, threads};
-  const int wanted = std::min(threads, items) - 1;
+  int helpers = std::min(threads, items) - 1;
   {
     const std::lock_guard lock(mutex_);
-    MakeThreads(wanted);
+    MakeThreads(helpers);
     loops_.push_back(&loop);
+    helpers = std::min(helpers, std::max(cores_, threads) - computing - helping_);
   }
-  for (int helper = 0; helper < wanted; ++helper) loop_waits_.notify_one();
+  for (int helper = 0; helper < helpers; ++helper) loop_waits_.notify_one();
   loop.DoItems(mutex_);
   std::unique_lock lock(mutex_);
   std::erase(loops_, &loop);
