@@ -2,6 +2,7 @@
 
 #include <absl/strings/str_cat.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <numeric>
@@ -71,37 +72,24 @@ std::vector<int> Digits(int base, bool scrambled) {
   return digits;
 }
 
-// Computes Σ_i σ(d_i) base^(−i−1) for index = Σ_i d_i base^i, with σ(0) = 0, for the indices 1, 2,
-// … in turn. Counting up costs less than the divisions that find the digits of an index.
-class RadicalInverses {
- public:
-  RadicalInverses(int base, std::vector<int> permutation)
-      : base_(base), permutation_(std::move(permutation)) {}
-
-  double Next() {
-    CountUp();
-    double value = 0;
-    for (size_t i = 0; i < digits_.size(); ++i) {
-      value += weights_[i] * permutation_[static_cast<size_t>(digits_[i])];
+// Computes Σ_i σ(d_i) base^(−i−1) for each index Σ_i d_i base^i from 1 to the number of values. The
+// indices below base^(k+1) with the digit d_k are those below base^k with σ(d_k) base^(−k−1) added.
+void FillRadicalInverses(int base, const std::vector<int>& permutation, VectorRef values) {
+  Vector inverse(values.size() + 1);  // of each index from 0
+  inverse[0] = 0;
+  double weight = 1;
+  for (Eigen::Index power = 1; power < inverse.size(); power *= base) {
+    weight /= base;
+    for (int digit = 1; digit < base; ++digit) {
+      const Eigen::Index first = digit * power;
+      if (first >= inverse.size()) break;
+      const Eigen::Index count = std::min(power, inverse.size() - first);
+      inverse.segment(first, count) =
+          inverse.head(count).array() + weight * permutation[static_cast<size_t>(digit)];
     }
-    return value;
   }
-
- private:
-  void CountUp() {
-    for (int& digit : digits_) {
-      if (++digit < base_) return;
-      digit = 0;
-    }
-    digits_.push_back(1);
-    weights_.push_back((weights_.empty() ? 1 : weights_.back()) / base_);
-  }
-
-  const int base_;
-  const std::vector<int> permutation_;
-  std::vector<int> digits_;      // of the index, the lowest first
-  std::vector<double> weights_;  // base^(−i−1) of each
-};
+  values = inverse.tail(values.size());
+}
 
 constexpr int kPlainDimensions = 3;
 
@@ -139,8 +127,7 @@ Matrix UnitCubePoints(PointSet set, int dimension, int count) {
   }
   for (int k = 0; column < dimension; ++k, ++column) {
     const int prime = primes[static_cast<size_t>(k)];
-    RadicalInverses inverses(prime, Digits(prime, k >= kPlainDimensions));
-    for (double& coordinate : points.col(column)) coordinate = inverses.Next();
+    FillRadicalInverses(prime, Digits(prime, k >= kPlainDimensions), points.col(column));
   }
   return points;
 }

@@ -219,6 +219,10 @@ std::vector<AssessmentRequest> ComponentMixture::Requests(const Components& comp
   return requests;
 }
 
+absl::StatusOr<AssessedMixture> ComponentMixture::Assess(const Stop& stop) const {
+  return Assess(EffortForEstimate(component(0).problem().dimension()), stop);
+}
+
 absl::StatusOr<AssessedMixture> ComponentMixture::Assess(const PosteriorEffort& effort,
                                                          const Stop& stop) const {
   std::vector<AssessmentRequest> requests = Requests(components_);

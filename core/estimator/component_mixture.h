@@ -48,7 +48,9 @@ class ComponentMixture {
   // Counts the work that the other mixture has done as done for this one.
   void AddWorkOf(const ComponentMixture& other);
 
-  // Assesses the mixture. Returns an error only on a stop request.
+  // Assesses the mixture, by default with the effort for an estimate. Returns an error only on a
+  // stop request.
+  absl::StatusOr<AssessedMixture> Assess(const Stop& stop) const;
   absl::StatusOr<AssessedMixture> Assess(const PosteriorEffort& effort, const Stop& stop) const;
 
  private:

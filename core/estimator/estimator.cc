@@ -183,12 +183,12 @@ absl::Status Estimator::Implementation::Restore(const EstimatorSnapshot& snapsho
 }
 
 absl::StatusOr<Estimate> Estimator::Implementation::CurrentEstimate(const Stop& stop) const {
-  POLYEST_ASSIGN_OR_RETURN(AssessedMixture assessed, mixture_->Assess(PosteriorEffort(), stop));
+  POLYEST_ASSIGN_OR_RETURN(AssessedMixture assessed, mixture_->Assess(stop));
   return std::move(assessed.whole.estimate);
 }
 
 absl::StatusOr<Estimate> Estimator::Implementation::TestedEstimate(const Stop& stop) const {
-  POLYEST_ASSIGN_OR_RETURN(AssessedMixture assessed, mixture_->Assess(PosteriorEffort(), stop));
+  POLYEST_ASSIGN_OR_RETURN(AssessedMixture assessed, mixture_->Assess(stop));
   Estimate& estimate = assessed.whole.estimate;
   if (!IsWorthTesting(estimate)) return std::move(estimate);
   const LearnedNoise& noise = mixture_->component(assessed.order.front()).expansion().noise();
@@ -211,8 +211,7 @@ absl::StatusOr<Posterior> Estimator::Implementation::CurrentPosterior(
 absl::StatusOr<CostProfiles> Estimator::Implementation::CurrentProfiles(
     const ProfileOptions& options, const Stop& stop) const {
   POLYEST_RETURN_IF_ERROR(Validate(options, estimated_problem().prior()));
-  POLYEST_ASSIGN_OR_RETURN(const AssessedMixture assessed,
-                           mixture_->Assess(PosteriorEffort(), stop));
+  POLYEST_ASSIGN_OR_RETURN(const AssessedMixture assessed, mixture_->Assess(stop));
   const auto profile = [&](const Assessed& one, size_t component) {
     const RegionalExpansion& expansion = mixture_->component(component).expansion();
     return ProfileCost(one, expansion.MakeCost(one.estimate.regularization), expansion.design(),
@@ -232,8 +231,7 @@ absl::StatusOr<CostProfiles> Estimator::Implementation::CurrentProfiles(
 }
 
 absl::StatusOr<DensityBasis> Estimator::Implementation::MakeDensityBasis(const Stop& stop) const {
-  POLYEST_ASSIGN_OR_RETURN(const AssessedMixture assessed,
-                           mixture_->Assess(PosteriorEffort(), stop));
+  POLYEST_ASSIGN_OR_RETURN(const AssessedMixture assessed, mixture_->Assess(stop));
   DensityBasis basis;
   for (size_t k = 0; k < assessed.order.size(); ++k) {
     const Assessed& one = assessed.components.empty() ? assessed.whole : assessed.components[k];
@@ -262,8 +260,7 @@ absl::StatusOr<RegularizationSweep> Estimator::Implementation::CurrentRegulariza
     const RegularizationOptions& options, const Stop& stop) const {
   POLYEST_RETURN_IF_ERROR(options.Validate());
   POLYEST_RETURN_IF_ERROR(RefuseFilters(problem_.problem(), "a regularization sweep"));
-  POLYEST_ASSIGN_OR_RETURN(const AssessedMixture assessed,
-                           mixture_->Assess(PosteriorEffort(), stop));
+  POLYEST_ASSIGN_OR_RETURN(const AssessedMixture assessed, mixture_->Assess(stop));
   const RegionalExpansion& expansion = mixture_->component(assessed.order.front()).expansion();
   return SweepRegularization(estimated_problem(), expansion, assessed.whole, options, stop);
 }
@@ -272,8 +269,7 @@ absl::StatusOr<Prediction> Estimator::Implementation::CurrentPrediction(
     const PredictionOptions& options, const Stop& stop) const {
   const ResolvedProblem& own = estimated_problem();
   POLYEST_RETURN_IF_ERROR(Validate(options, own, rows_processed()));
-  POLYEST_ASSIGN_OR_RETURN(const AssessedMixture assessed,
-                           mixture_->Assess(PosteriorEffort(), stop));
+  POLYEST_ASSIGN_OR_RETURN(const AssessedMixture assessed, mixture_->Assess(stop));
   const AssessmentRequest heaviest =
       mixture_->component(assessed.order.front()).RequestAssessment();
   PredictionSubject subject;

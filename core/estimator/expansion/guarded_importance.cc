@@ -108,12 +108,14 @@ class GuardedImportance {
       return std::nullopt;
     }
     const double reach = std::sqrt(cost_.dimension()) + kReach;
+    std::vector<Eigen::Index> near;  // in cost
     for (Eigen::Index i = 0; i < known_.costs.size(); ++i) {
-      if (!(known_.costs[i] < most)) continue;
-      // r = ‖Lᵀ(η − η̂)‖
-      const double radius = (factor.transpose() * (known_.etas.row(i).transpose() - eta)).norm();
-      if (!(radius < reach)) return std::nullopt;
+      if (known_.costs[i] < most) near.push_back(i);
     }
+    // r = ‖Lᵀ(η − η̂)‖
+    const Matrix away = known_.etas(near, Eigen::all).rowwise() - eta.transpose();
+    const Vector radii = (away * factor).rowwise().norm();
+    if (!(radii.array() < reach).all()) return std::nullopt;
     return factor;
   }
 

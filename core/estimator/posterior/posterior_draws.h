@@ -26,6 +26,10 @@ struct PosteriorEffort {
   bool evidence = false;                 // whether the model's evidence is wanted, too
 };
 
+// Returns the effort for an estimate. Fewer points suffice for fewer parameters, because points of
+// low discrepancy cover few dimensions more evenly.
+PosteriorEffort EffortForEstimate(int dimension);
+
 struct PosteriorDraws {
   PosteriorMethod method = PosteriorMethod::kMarkovChains;
   Matrix scores;   // draws × n, scores z of the uncertain parameters
