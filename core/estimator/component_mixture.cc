@@ -220,7 +220,7 @@ std::vector<AssessmentRequest> ComponentMixture::Requests(const Components& comp
 }
 
 absl::StatusOr<AssessedMixture> ComponentMixture::Assess(const Stop& stop) const {
-  return Assess(EffortForEstimate(component(0).problem().dimension()), stop);
+  return Assess(EffortForEstimate(component(0).problem()), stop);
 }
 
 absl::StatusOr<AssessedMixture> ComponentMixture::Assess(const PosteriorEffort& effort,

@@ -156,9 +156,15 @@ Matrix PosteriorDraws::Germs(const Prior& prior) const {
   return xis;
 }
 
-PosteriorEffort EffortForEstimate(int dimension) {
+PosteriorEffort EffortForEstimate(const ResolvedProblem& problem) {
   PosteriorEffort effort;
-  effort.importance_points = std::min(effort.importance_points, kPointsPerParameter * dimension);
+  const bool unknown_noise =
+      std::ranges::any_of(problem.problem().measured, [](const MeasuredOutput& output) {
+        return output.noise.unknown || output.noise.correlation == NoiseCorrelation::kUnknown;
+      });
+  if (unknown_noise) return effort;
+  const int points = kPointsPerParameter * problem.dimension();
+  effort.importance_points = std::min(effort.importance_points, points);
   return effort;
 }
 

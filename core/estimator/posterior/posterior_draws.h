@@ -13,6 +13,7 @@
 #include "core/bayes/cost.h"
 #include "core/bayes/minimizer.h"
 #include "core/estimator/expansion/expansion_design.h"
+#include "core/estimator/problem/resolved_problem.h"
 #include "polyest/posterior.h"
 #include "polyest/stop.h"
 
@@ -27,8 +28,9 @@ struct PosteriorEffort {
 };
 
 // Returns the effort for an estimate. Fewer points suffice for fewer parameters, because points of
-// low discrepancy cover few dimensions more evenly.
-PosteriorEffort EffortForEstimate(int dimension);
+// low discrepancy cover few dimensions more evenly, unless the noise is unknown: the posterior over
+// a short record then has the tails of a Student's t.
+PosteriorEffort EffortForEstimate(const ResolvedProblem& problem);
 
 struct PosteriorDraws {
   PosteriorMethod method = PosteriorMethod::kMarkovChains;
