@@ -150,6 +150,7 @@ void Cost::EvaluateBlock(const ConstMatrixRef& etas, VectorRef totals) const {
   thread_local Matrix product;
   thread_local Matrix xis;
   thread_local Vector remainders;
+  thread_local Vector priors;
   thread_local Vector xi;
   basis_->EvaluateMany(etas, difference);
   difference.rowwise() -= reference_phi_.transpose();
@@ -158,10 +159,11 @@ void Cost::EvaluateBlock(const ConstMatrixRef& etas, VectorRef totals) const {
   xis.resize(etas.rows(), dimension());
   xis.noalias() = etas * region_.axes().transpose();
   xis.rowwise() += region_.centre().transpose();
+  priors.resize(etas.rows());
+  prior_.NegativeLogDensityMany(xis, priors);
   for (Eigen::Index i = 0; i < totals.size(); ++i) {
     xi = xis.row(i).transpose();
-    const double prior = prior_.NegativeLogDensity(xi);
-    totals[i] = Supports(xi) ? Total(power_ * totals[i], prior, regularization_) : kInfinity;
+    totals[i] = Supports(xi) ? Total(power_ * totals[i], priors[i], regularization_) : kInfinity;
     if (has_remainder()) totals[i] += power_ * (remainders[i] + remainder_constant_);
     if (population_ != nullptr) totals[i] += population_->Evaluate(xi, power_);
   }

@@ -66,7 +66,7 @@ class DifferentialEvolution {
   Matrix proposal_;
   Vector proposal_costs_;
   Matrix us_, moved_us_, other_us_;
-  Vector volumes_, moved_volumes_, other_volumes_, volume_changes_;
+  Vector volumes_, moved_volumes_, volume_changes_;
 };
 
 }  // namespace polyest::internal

@@ -176,6 +176,13 @@ double Prior::NegativeLogDensity(const ConstVectorRef& xi) const {
   return sum;
 }
 
+void Prior::NegativeLogDensityMany(const ConstMatrixRef& xis, VectorRef values) const {
+  values.setZero();
+  for (int i = 0; i < dimension(); ++i) {
+    germs_[static_cast<size_t>(i)].SubtractLogDensities(xis.col(i), values);
+  }
+}
+
 Vector Prior::Gradient(const ConstVectorRef& xi) const {
   Vector gradient(dimension());
   for (int i = 0; i < dimension(); ++i) {

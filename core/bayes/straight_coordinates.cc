@@ -31,21 +31,38 @@ StraightCoordinates::StraightCoordinates(const Prior& prior, const Region& regio
     const bool positive = parameter.ToParameter(germ.Lower()) > 0;
     const bool negative = parameter.ToParameter(germ.Upper()) < 0;
     if (map == ParameterMap::kExponential && !positive && !negative) continue;
-    curved_.push_back({i, negative ? -1.0 : 1.0, !prior.IsCurved(i)});
+    const bool log_is_affine = parameter.map == ParameterMap::kExponential && used == germ;
+    curved_.push_back(
+        {i, negative ? -1.0 : 1.0, !prior.IsCurved(i), log_is_affine ? parameter.scale : 0});
+  }
+}
+
+Matrix StraightCoordinates::Scores(const ConstMatrixRef& etas) const {
+  const Matrix xis = region_.ManyToGerm(etas);
+  return prior_.correlated() ? Matrix(xis * prior_.factor().transpose()) : xis;
+}
+
+double StraightCoordinates::OfScore(const Curved& curved, double z) const {
+  const double theta = prior_.OfScore(curved.parameter, z);
+  return map_ == ParameterMap::kExponential ? std::log(curved.sign * theta) : theta;
+}
+
+void StraightCoordinates::FromLocal(const ConstMatrixRef& etas, Matrix& us) const {
+  us = Scores(etas);
+  for (const Curved& curved : curved_) {
+    for (double& u : us.col(curved.parameter)) u = OfScore(curved, u);
   }
 }
 
 void StraightCoordinates::FromLocal(const ConstMatrixRef& etas, Matrix& us,
                                     Vector& log_volumes) const {
-  us = region_.ManyToGerm(etas);
-  if (prior_.correlated()) us = (us * prior_.factor().transpose()).eval();
+  us = Scores(etas);
   log_volumes.setZero(us.rows());
   for (const Curved& curved : curved_) {
     for (Eigen::Index row = 0; row < us.rows(); ++row) {
       double& u = us(row, curved.parameter);
       const double z = u;
-      const double theta = prior_.OfScore(curved.parameter, z);
-      u = map_ == ParameterMap::kExponential ? std::log(curved.sign * theta) : theta;
+      u = OfScore(curved, z);
       log_volumes[row] += LogSlope(curved, z, u);
     }
   }
@@ -69,9 +86,10 @@ void StraightCoordinates::ToLocal(const ConstMatrixRef& us, Matrix& etas,
 }
 
 double StraightCoordinates::LogSlope(const Curved& curved, double z, double u) const {
-  const double log_theta_slope = map_ == ParameterMap::kExponential ? u : 0;  // |dθ/du| = e^u or 1
-  if (curved.theta_is_affine) return log_theta_slope;
-  return log_theta_slope - std::log(prior_.SlopeOfScore(curved.parameter, z));
+  const double log_of_theta = map_ == ParameterMap::kExponential ? u : 0;  // log |dθ/du|
+  if (curved.theta_is_affine) return log_of_theta;
+  if (curved.log_theta_slope > 0) return log_of_theta - curved.log_theta_slope * z;
+  return log_of_theta - std::log(prior_.SlopeOfScore(curved.parameter, z));
 }
 
 }  // namespace polyest::internal

@@ -28,15 +28,21 @@ class StraightCoordinates {
 
   // Map the rows of `etas` to those of `us`, and back; `log_volumes` receives log |dη/du| at each,
   // up to a constant. Rows of u outside of Ω are mapped outside of it, or to what is not a number.
+  void FromLocal(const ConstMatrixRef& etas, Matrix& us) const;
   void FromLocal(const ConstMatrixRef& etas, Matrix& us, Vector& log_volumes) const;
   void ToLocal(const ConstMatrixRef& us, Matrix& etas, Vector& log_volumes) const;
 
  private:
   struct Curved {
     int parameter;
-    double sign;           // of θ, if u is its logarithm
-    bool theta_is_affine;  // in the score z
+    double sign;             // of θ, if u is its logarithm
+    bool theta_is_affine;    // in the score z
+    double log_theta_slope;  // of log θ over z, if log θ is affine in z; else 0
   };
+
+  // Returns the scores z of the rows.
+  Matrix Scores(const ConstMatrixRef& etas) const;
+  double OfScore(const Curved& curved, double z) const;  // u
 
   // Returns log |dz/du| up to a constant of the parameter.
   double LogSlope(const Curved& curved, double z, double u) const;

@@ -169,6 +169,14 @@ double Germ::LogDensity(double xi) const {
   return -kInfinity;
 }
 
+void Germ::SubtractLogDensities(const ConstVectorRef& xis, VectorRef values) const {
+  if (family_ == GermFamily::kNormal) {
+    values.array() -= log_normalization_ - 0.5 * xis.array().square();
+  } else {
+    for (Eigen::Index i = 0; i < xis.size(); ++i) values[i] -= LogDensity(xis[i]);
+  }
+}
+
 double Germ::LogDensityDerivative(double xi) const {
   switch (family_) {
     case GermFamily::kNormal:
