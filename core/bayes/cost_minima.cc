@@ -14,6 +14,9 @@ constexpr int kMaxHalvings = 6;
 // Steps, in widths of the box, at which a search by gradients is so near a minimum that Newton's
 // method takes over.
 constexpr double kNear = 1e-3;
+// Least curvature of a step where the Hessian is not positive definite, as a fraction of the
+// largest.
+constexpr double kLeastCurvature = 1e-10;
 constexpr double kSufficient = 1e-4;     // of the predicted decrease: Armijo's condition
 constexpr double kConvergedStep = 1e-9;  // in widths of the box
 constexpr double kReached = 1e-12;       // room to a limit, relative to it, that is rounding only
@@ -30,23 +33,34 @@ struct Limits {
     bounds << problem.upper, -problem.lower, problem.bound;
   }
 
+  // Whether the point is within all limits, but for rounding.
   bool Allow(const Vector& eta) const {
-    return ((normals.transpose() * eta).array() <= bounds.array()).all();
+    const Eigen::ArrayXd rounding = kReached * (1 + bounds.array().abs());
+    return ((normals.transpose() * eta - bounds).array() <= rounding).all();
   }
 
   Matrix normals;
   Vector bounds;
 };
 
+// Where a search takes steps: only where the cost is convex in the free directions, or anywhere.
+enum class Steps { kWhereConvex, kAnywhere };
+
 // Newton's method with an active set: steps keep to the limits that have stopped one before, until
 // the cost falls away from such a limit (J. Nocedal, S. Wright, Numerical Optimization, 16.5).
 class NewtonSearch {
  public:
-  NewtonSearch(const Cost& cost, const MinimizationProblem& problem)
-      : cost_(cost), limits_(problem), same_(kConvergedStep * (problem.upper - problem.lower)) {}
+  NewtonSearch(const Cost& cost, const MinimizationProblem& problem, Steps steps)
+      : cost_(cost),
+        lower_(problem.lower),
+        upper_(problem.upper),
+        limits_(problem),
+        same_(kConvergedStep * (problem.upper - problem.lower)),
+        steps_(steps) {}
 
   std::optional<Vector> From(Vector eta) {
     if (!limits_.Allow(eta)) return std::nullopt;
+    eta = eta.cwiseMax(lower_).cwiseMin(upper_);
     const Eigen::Index most_steps = kMaxSteps + 2 * eta.size();
     Vector gradient(eta.size());
     for (Eigen::Index step = 0; step < most_steps; ++step) {
@@ -57,6 +71,7 @@ class NewtonSearch {
       if (!move) return std::nullopt;
       const double slope = gradient.dot(*move);
       if ((move->array().abs() <= same_.array()).all() || -slope <= kRounding * std::abs(value)) {
+        if (!convex_) return std::nullopt;  // a saddle
         // Along a flat direction the last step may be long.
         Vector next = eta + *move;
         PutOnSides(next);
@@ -96,8 +111,7 @@ class NewtonSearch {
   }
 
   // Returns Newton's step in the directions that the active limits leave, and sets their
-  // multipliers, those λ for which gradient + Σ λ a is least; nothing where the Hessian in these
-  // directions is not positive definite.
+  // multipliers, those λ for which gradient + Σ λ a is least; nothing where there is none.
   std::optional<Vector> Move(const Vector& eta, const Vector& gradient) {
     const Matrix hessian = cost_.Hessian(eta);
     if (!hessian.allFinite()) return std::nullopt;
@@ -106,16 +120,28 @@ class NewtonSearch {
     const PivotedQr factors = SolveByPivotedQr(limits_.normals(Eigen::all, active_), -gradient);
     multipliers_ = factors.solution;
     const Matrix free = factors.q.rightCols(eta.size() - factors.rank);
+    convex_ = true;
     if (free.cols() == 0) return Vector(Vector::Zero(eta.size()));
     const std::optional<Vector> step =
         NewtonStep(free.transpose() * hessian * free, free.transpose() * gradient);
     return step ? std::optional<Vector>(free * *step) : std::nullopt;
   }
 
-  static std::optional<Vector> NewtonStep(const Matrix& hessian, const Vector& gradient) {
+  // Where the Hessian is not positive definite, returns the step for the magnitudes of its
+  // eigenvalues (ibid. 3.4), which leads down, away from a saddle.
+  std::optional<Vector> NewtonStep(const Matrix& hessian, const Vector& gradient) {
     const CholeskyFactor factor(hessian);
-    if (!factor.positive_definite()) return std::nullopt;
-    const Vector step = -factor.Solve(gradient);
+    convex_ = factor.positive_definite();
+    if (convex_) return FiniteStep(-factor.Solve(gradient));
+    if (steps_ == Steps::kWhereConvex) return std::nullopt;
+    const SymmetricEigen eigen = DecomposeSymmetric(hessian);
+    const Vector size = eigen.values.cwiseAbs();
+    const Vector curvature = size.cwiseMax(kLeastCurvature * size.maxCoeff());
+    return FiniteStep(-eigen.vectors *
+                      (eigen.vectors.transpose() * gradient).cwiseQuotient(curvature));
+  }
+
+  static std::optional<Vector> FiniteStep(const Vector& step) {
     return step.allFinite() ? std::optional<Vector>(step) : std::nullopt;
   }
 
@@ -132,9 +158,10 @@ class NewtonSearch {
       fraction = std::max(0.0, room[i] / speed[i]);
       limit = i;
     }
+    const double most = value + kRounding * std::abs(value);
     for (int halving = 0; halving <= kMaxHalvings; ++halving, fraction /= 2) {
       const Vector next = eta + fraction * move;
-      if (cost_.Evaluate(next).total <= value + kSufficient * fraction * slope) {
+      if (cost_.Evaluate(next).total <= most + kSufficient * fraction * slope) {
         eta = next;
         if (limit && halving == 0) active_.push_back(*limit);
         PutOnSides(eta);
@@ -145,17 +172,21 @@ class NewtonSearch {
   }
 
   const Cost& cost_;
+  const Vector& lower_;
+  const Vector& upper_;
   const Limits limits_;
   const Vector same_;
   std::vector<Eigen::Index> active_;
+  const Steps steps_;
   Vector multipliers_;  // of the active limits
+  bool convex_ = true;  // whether the Hessian of the last step was positive definite
 };
 
 }  // namespace
 
 std::optional<Vector> MinimumByNewton(const Cost& cost, const MinimizationProblem& problem,
                                       const Vector& start) {
-  return NewtonSearch(cost, problem).From(start);
+  return NewtonSearch(cost, problem, Steps::kWhereConvex).From(start);
 }
 
 std::vector<Minimum> FindMinimaOf(const Cost& cost, const MinimizationProblem& problem,
@@ -170,7 +201,7 @@ std::vector<Minimum> FindMinimaOf(const Cost& cost, const MinimizationProblem& p
     std::optional<Vector> reached = MinimumByNewton(cost, problem, start);
     if (!reached) {
       start = DescendFrom(problem, start, {.relative_step = kNear}, stop);
-      reached = MinimumByNewton(cost, problem, start);
+      reached = NewtonSearch(cost, problem, Steps::kAnywhere).From(start);
     }
     if (reached) {
       found.push_back({.point = *reached,

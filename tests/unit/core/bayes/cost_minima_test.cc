@@ -49,6 +49,10 @@ TEST(CostMinima, AreBothMinimaOfAnUnobservedSign) {
   ASSERT_EQ(minima.size(), 2u);
   EXPECT_NEAR(std::abs(minima[0].point[0]), std::sqrt(1 - 0.005), 1e-12);
   EXPECT_NEAR(minima[1].point[0], -minima[0].point[0], 1e-12);
+  // Nor does the search end there if it begins there, where the gradient is 0.
+  const auto one = FindMinimaOf(cost, search, Matrix::Zero(1, 1), Stop());
+  ASSERT_EQ(one.size(), 1u);
+  EXPECT_NEAR(std::abs(one[0].point[0]), std::sqrt(1 - 0.005), 1e-12);
 }
 
 // The minimum of ½ Σ ((2 − ξ_i)/σ)² + ½ Σ ξ_i² in the box is its corner; with ξ_1 + ξ_2 ≤ 3, the
@@ -62,6 +66,10 @@ TEST(CostMinima, LieOnTheBoundsThatAreActive) {
     EXPECT_LT((*minimum - Vector::Constant(2, 1.5)).cwiseAbs().maxCoeff(), 1e-12);
   }
   EXPECT_FALSE(MinimumByNewton(cost, boxed, Vector::Constant(2, 1.6)));
+  // A search by gradients may end outside by as much as rounding.
+  const auto rounded = MinimumByNewton(cost, boxed, Vector::Constant(2, std::nextafter(1.5, 2)));
+  ASSERT_TRUE(rounded);
+  EXPECT_EQ(*rounded, Vector::Constant(2, 1.5));
 
   MinimizationProblem constrained = SearchFor(cost, 4);
   constrained.constraint = Matrix::Ones(1, 2);
