@@ -11,7 +11,7 @@ namespace {
 
 // The number of points whose matrices are computed together, so that they stay in the cache.
 constexpr Eigen::Index kBlock = 128;
-// Operations for one point beside those that grow with the terms: basis, prior, region.
+// Operations for one point beside those that grow with the square of the terms.
 constexpr int64_t kOtherOperations = 300;
 
 // Returns J_mismatch + α² J_apriori; for α² = 0 an infinite prior term has no effect.
@@ -137,7 +137,9 @@ void Cost::EvaluateMany(const ConstMatrixRef& etas, Vector& totals) const {
   totals.resize(etas.rows());
   const auto blocks = static_cast<int>((etas.rows() + kBlock - 1) / kBlock);
   const int64_t operations = etas.rows() * (basis_->size() * basis_->size() + kOtherOperations);
-  ParallelFor(blocks, ThreadsFor(operations, threads_), [&](int block) {
+  // A population takes much longer, by as much as there are runs.
+  const int threads = population_ != nullptr ? threads_ : ThreadsFor(operations, threads_);
+  ParallelFor(blocks, threads, [&](int block) {
     const Eigen::Index first = block * kBlock;
     const Eigen::Index count = std::min(kBlock, etas.rows() - first);
     EvaluateBlock(etas.middleRows(first, count), totals.segment(first, count));

@@ -60,7 +60,6 @@ class NewtonSearch {
 
   std::optional<Vector> From(Vector eta) {
     if (!limits_.Allow(eta)) return std::nullopt;
-    eta = eta.cwiseMax(lower_).cwiseMin(upper_);
     const Eigen::Index most_steps = kMaxSteps + 2 * eta.size();
     Vector gradient(eta.size());
     for (Eigen::Index step = 0; step < most_steps; ++step) {
@@ -102,16 +101,19 @@ class NewtonSearch {
     PutOnSides(eta);
   }
 
-  // Makes a point that rounding has moved off the active sides of the box lie on them exactly.
+  // Makes a point that rounding has moved off the active sides of the box lie on them exactly, and
+  // one that it has moved beyond the others, on those.
   void PutOnSides(Vector& eta) const {
     const Eigen::Index n = eta.size();
     for (const Eigen::Index i : active_) {
       if (i < 2 * n) eta[i % n] = i < n ? limits_.bounds[i] : -limits_.bounds[i];
     }
+    eta = eta.cwiseMax(lower_).cwiseMin(upper_);
   }
 
   // Returns Newton's step in the directions that the active limits leave, and sets their
-  // multipliers, those λ for which gradient + Σ λ a is least; nothing where there is none.
+  // multipliers, those λ for which gradient + Σ λ a is least. Returns nothing where the Hessian
+  // is not finite, or not positive definite where `steps_` asks for that.
   std::optional<Vector> Move(const Vector& eta, const Vector& gradient) {
     const Matrix hessian = cost_.Hessian(eta);
     if (!hessian.allFinite()) return std::nullopt;

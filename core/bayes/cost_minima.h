@@ -13,9 +13,9 @@
 namespace polyest::internal {
 
 // Returns the minimum, in the box and within the constraints of `problem`, to which Newton's method
-// with backtracking and an active set leads from `start`; nothing if the start is outside, the
-// Hessian in the directions that are free is not positive definite somewhere on the way, or the
-// method does not converge.
+// with backtracking and an active set leads from `start`; nothing if the start is outside by
+// more than rounding, the Hessian in the directions that are free is not positive definite
+// somewhere on the way, or the method does not converge.
 std::optional<Vector> MinimumByNewton(const Cost& cost, const MinimizationProblem& problem,
                                       const Vector& start);
 

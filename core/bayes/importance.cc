@@ -62,7 +62,7 @@ Proposal MakeProposal(int dimension, int points) {
 }
 
 // Returns the proposal, which is the same for all posteriors and takes longer to make than the
-// costs of a small problem. Those of usual sizes are kept, at most 15 MB.
+// costs of a small problem. Those of usual sizes are kept, at most 16 MB.
 std::shared_ptr<const Proposal> ProposalOf(int dimension, int points) {
   constexpr int kMostDimensions = 12, kMostPoints = 16'384;
   if (dimension > kMostDimensions || points > kMostPoints) {

@@ -67,7 +67,7 @@ class Prior {
 
   // J_apriori (+∞ outside Ω), its gradient (n) and its curvature, the diagonal of the Hessian (n).
   double NegativeLogDensity(const ConstVectorRef& xi) const;
-  // Writes J_apriori at each row of `xis` (rows × n) into `values` (rows).
+  // Writes J_apriori at each row of `xis` (rows × n, all numbers) into `values` (rows).
   void NegativeLogDensityMany(const ConstMatrixRef& xis, VectorRef values) const;
   Vector Gradient(const ConstVectorRef& xi) const;
   Vector Curvature(const ConstVectorRef& xi) const;

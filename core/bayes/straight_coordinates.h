@@ -37,7 +37,7 @@ class StraightCoordinates {
     int parameter;
     double sign;             // of θ, if u is its logarithm
     bool theta_is_affine;    // in the score z
-    double log_theta_slope;  // of log θ over z, if log θ is affine in z; else 0
+    double log_theta_slope;  // d log θ/dz if log θ is affine in z, else 0
   };
 
   // Returns the scores z of the rows.

@@ -72,8 +72,9 @@ std::vector<int> Digits(int base, bool scrambled) {
   return digits;
 }
 
-// Computes Σ_i σ(d_i) base^(−i−1) for each index Σ_i d_i base^i from 1 to the number of values. The
-// indices below base^(k+1) with the digit d_k are those below base^k with σ(d_k) base^(−k−1) added.
+// Computes the radical inverse Σ_i σ(d_i) base^(−i−1) of each index Σ_i d_i base^i from 1 to the
+// number of values. The inverses of indices of k + 1 digits with the leading digit d_k are those of
+// the indices below base^k, plus σ(d_k) base^(−k−1).
 void FillRadicalInverses(int base, const std::vector<int>& permutation, VectorRef values) {
   Vector inverse(values.size() + 1);  // of each index from 0
   inverse[0] = 0;

@@ -65,7 +65,7 @@ class Germ {
 
   double Density(double xi) const;     // 0 outside the support
   double LogDensity(double xi) const;  // −∞ outside the support
-  // Subtracts the log density at each ξ from the value of the same row.
+  // Subtracts the log density at each ξ, a number, from the value of the same row.
   void SubtractLogDensities(const ConstVectorRef& xis, VectorRef values) const;
   // Derivatives of log ρ inside the open support.
   double LogDensityDerivative(double xi) const;

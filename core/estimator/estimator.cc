@@ -269,7 +269,9 @@ absl::StatusOr<Prediction> Estimator::Implementation::CurrentPrediction(
     const PredictionOptions& options, const Stop& stop) const {
   const ResolvedProblem& own = estimated_problem();
   POLYEST_RETURN_IF_ERROR(Validate(options, own, rows_processed()));
-  POLYEST_ASSIGN_OR_RETURN(const AssessedMixture assessed, mixture_->Assess(stop));
+  // More draws than trajectories, of which there may be 10,000.
+  POLYEST_ASSIGN_OR_RETURN(const AssessedMixture assessed,
+                           mixture_->Assess(PosteriorEffort(), stop));
   const AssessmentRequest heaviest =
       mixture_->component(assessed.order.front()).RequestAssessment();
   PredictionSubject subject;

@@ -79,7 +79,7 @@ test('all panels follow a record that polyest streams', options, async () => {
   // As `polyest estimate` prints them.
   await says(page, '41.2976');
   await says(page, '0.23015');
-  await says(page, '94.2 %');
+  await says(page, '94.1 %');
   await says(page, 'The data determine every combination');
   await hasNoNonsense(page);
   await page.evaluate(() => dispatchEvent(new Event('beforeprint')));
