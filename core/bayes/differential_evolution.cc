@@ -98,8 +98,8 @@ void DifferentialEvolution::Propose(const Halves& halves, const Matrix& etas) {
 
 void DifferentialEvolution::ProposeIn(const StraightCoordinates& coordinates, const Halves& halves,
                                       const Matrix& etas) {
-  coordinates.FromLocal(etas.middleRows(halves.first, halves.count), us_, volumes_);
-  coordinates.FromLocal(etas.middleRows(halves.other, halves.other_count), other_us_);
+  coordinates.FromLocal(etas.middleRows(halves.first, halves.count), us_, &volumes_);
+  coordinates.FromLocal(etas.middleRows(halves.other, halves.other_count), other_us_, nullptr);
   moved_us_.resize(halves.count, etas.cols());
   for (Eigen::Index i = 0; i < halves.count; ++i) {
     const double gamma = Factor(etas.cols());

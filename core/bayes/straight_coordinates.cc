@@ -37,33 +37,18 @@ StraightCoordinates::StraightCoordinates(const Prior& prior, const Region& regio
   }
 }
 
-Matrix StraightCoordinates::Scores(const ConstMatrixRef& etas) const {
-  const Matrix xis = region_.ManyToGerm(etas);
-  return prior_.correlated() ? Matrix(xis * prior_.factor().transpose()) : xis;
-}
-
-double StraightCoordinates::OfScore(const Curved& curved, double z) const {
-  const double theta = prior_.OfScore(curved.parameter, z);
-  return map_ == ParameterMap::kExponential ? std::log(curved.sign * theta) : theta;
-}
-
-void StraightCoordinates::FromLocal(const ConstMatrixRef& etas, Matrix& us) const {
-  us = Scores(etas);
-  for (const Curved& curved : curved_) {
-    for (double& u : us.col(curved.parameter)) u = OfScore(curved, u);
-  }
-}
-
 void StraightCoordinates::FromLocal(const ConstMatrixRef& etas, Matrix& us,
-                                    Vector& log_volumes) const {
-  us = Scores(etas);
-  log_volumes.setZero(us.rows());
+                                    Vector* log_volumes) const {
+  us = region_.ManyToGerm(etas);
+  if (prior_.correlated()) us = (us * prior_.factor().transpose()).eval();
+  if (log_volumes != nullptr) log_volumes->setZero(us.rows());
   for (const Curved& curved : curved_) {
     for (Eigen::Index row = 0; row < us.rows(); ++row) {
       double& u = us(row, curved.parameter);
       const double z = u;
-      u = OfScore(curved, z);
-      log_volumes[row] += LogSlope(curved, z, u);
+      const double theta = prior_.OfScore(curved.parameter, z);
+      u = map_ == ParameterMap::kExponential ? std::log(curved.sign * theta) : theta;
+      if (log_volumes != nullptr) (*log_volumes)[row] += LogSlope(curved, z, u);
     }
   }
 }

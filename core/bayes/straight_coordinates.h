@@ -26,10 +26,10 @@ class StraightCoordinates {
   // Whether u is anything but affine in the local coordinates η.
   bool curved() const { return !curved_.empty(); }
 
-  // Map the rows of `etas` to those of `us`, and back; `log_volumes` receives log |dη/du| at each,
-  // up to a constant. Rows of u outside of Ω are mapped outside of it, or to what is not a number.
-  void FromLocal(const ConstMatrixRef& etas, Matrix& us) const;
-  void FromLocal(const ConstMatrixRef& etas, Matrix& us, Vector& log_volumes) const;
+  // Map the rows of `etas` to those of `us`, and back; `log_volumes`, unless null, receives log
+  // |dη/du| at each, up to a constant. Rows of u outside of Ω are mapped outside of it, or to what
+  // is not a number.
+  void FromLocal(const ConstMatrixRef& etas, Matrix& us, Vector* log_volumes) const;
   void ToLocal(const ConstMatrixRef& us, Matrix& etas, Vector& log_volumes) const;
 
  private:
@@ -39,10 +39,6 @@ class StraightCoordinates {
     bool theta_is_affine;    // in the score z
     double log_theta_slope;  // d log θ/dz if log θ is affine in z, else 0
   };
-
-  // Returns the scores z of the rows.
-  Matrix Scores(const ConstMatrixRef& etas) const;
-  double OfScore(const Curved& curved, double z) const;  // u
 
   // Returns log |dz/du| up to a constant of the parameter.
   double LogSlope(const Curved& curved, double z, double u) const;

@@ -48,6 +48,18 @@ TEST(Prior, NegativeLogDensityIsTheSumOfTheClosedForms) {
   EXPECT_NEAR(prior.NegativeLogDensity(xi), expected, 1e-13);
 }
 
+TEST(Prior, NegativeLogDensityOfManyIsThatOfEach) {
+  const Prior prior = OneOfEach();
+  Matrix xis(4, 4);
+  xis << -1.5, 0.25, -0.5, 3, -9, 1, 0, 0.5, kInfinity, 0, 0, 1, 0, -1.1, 0, 1;
+  Vector values(4);
+  prior.NegativeLogDensityMany(xis, values);
+  for (Eigen::Index i = 0; i < 4; ++i) {
+    EXPECT_DOUBLE_EQ(values[i], prior.NegativeLogDensity(xis.row(i).transpose())) << i;
+  }
+  EXPECT_EQ(values.tail(2), Vector::Constant(2, kInfinity));  // outside
+}
+
 TEST(Prior, DerivativesAreThoseOfTheClosedForms) {
   const Prior prior = OneOfEach();
   const Eigen::Vector4d xi(-1.5, 0.25, -0.5, 3);

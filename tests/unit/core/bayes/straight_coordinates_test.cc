@@ -60,7 +60,7 @@ void ExpectRoundTrip(const Prior& prior, ParameterMap map) {
   Matrix etas = Matrix::Constant(2, n, 0.5), us, back;
   etas.row(1).setLinSpaced(-0.9, 0.8);
   Vector volumes, same;
-  coordinates.FromLocal(etas, us, volumes);
+  coordinates.FromLocal(etas, us, &volumes);
   coordinates.ToLocal(us, back, same);
   EXPECT_LT((back - etas).cwiseAbs().maxCoeff(), 1e-12);
   EXPECT_LT((same - volumes).cwiseAbs().maxCoeff(), 1e-12);
@@ -83,7 +83,7 @@ Vector At(ParameterMap map) {
   Matrix us;
   Vector volumes;
   StraightCoordinates(prior, whole, map)
-      .FromLocal(Matrix::Constant(1, prior.dimension(), 0.5), us, volumes);
+      .FromLocal(Matrix::Constant(1, prior.dimension(), 0.5), us, &volumes);
   return us.row(0).transpose();
 }
 
