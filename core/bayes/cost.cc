@@ -98,37 +98,48 @@ CostValue Cost::EvaluateWithGradient(const ConstVectorRef& eta, VectorRef gradie
   return value;
 }
 
-Matrix Cost::MismatchHessian(const ConstVectorRef& eta, double spent) const {
+// Returns the Hessian of β J_mismatch, or of β (J_mismatch + J_0).
+Matrix Cost::HessianOfData(const ConstVectorRef& eta, double spent, bool with_remainder) const {
   Vector d(basis_->size());
   Matrix phi_gradient(basis_->size(), dimension());
   basis_->EvaluateWithGradient(eta, d, phi_gradient);
+  const Vector phi = d;
   d -= reference_phi_;
   Vector by_d(d.size());
   mismatch_.EvaluateWithGradient(d, by_d);
+  if (with_remainder) by_d += remainder_;
   // ∂φᵀ ∂²J/∂d² ∂φ + Σ_s (∂J/∂d)_s ∇²φ_s
-  const Matrix hessian =
-      mismatch_.Curvature(d, phi_gradient, spent) + basis_->WeightedHessian(eta, by_d);
+  const Matrix hessian = mismatch_.Curvature(d, phi_gradient, spent) +
+                         basis_->WeightedHessian(eta, phi, phi_gradient, by_d);
   return 0.5 * power_ * (hessian + hessian.transpose());
+}
+
+// Adds that of a population.
+void Cost::AddPopulation(const ConstVectorRef& eta, Matrix& hessian) const {
+  if (population_ == nullptr) return;
+  const Matrix of_population = population_->Differentiate(region_.ToGerm(eta), power_).hessian;
+  hessian += region_.axes().transpose() * of_population * region_.axes();
+}
+
+Matrix Cost::MismatchHessian(const ConstVectorRef& eta, double spent) const {
+  return HessianOfData(eta, spent, /*with_remainder=*/false);
 }
 
 Matrix Cost::InformationHessian(const ConstVectorRef& eta, double spent) const {
   Matrix hessian = MismatchHessian(eta, spent);
-  if (population_ != nullptr) {
-    const Matrix of_population = population_->Differentiate(region_.ToGerm(eta), power_).hessian;
-    hessian += region_.axes().transpose() * of_population * region_.axes();
-  }
+  AddPopulation(eta, hessian);
   return hessian;
 }
 
 Matrix Cost::Hessian(const ConstVectorRef& eta, double spent) const {
-  Matrix hessian = InformationHessian(eta, spent);
+  Matrix hessian = HessianOfData(eta, spent, has_remainder());
+  AddPopulation(eta, hessian);
   if (regularization_ > 0) {
     // + α² axesᵀ diag(J_apriori″) axes
     const Vector curvature = prior_.Curvature(region_.ToGerm(eta));
     hessian +=
         regularization_ * (region_.axes().transpose() * curvature.asDiagonal() * region_.axes());
   }
-  if (has_remainder()) hessian += power_ * basis_->WeightedHessian(eta, remainder_);
   return hessian;
 }
 

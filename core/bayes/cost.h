@@ -71,6 +71,8 @@ class Cost {
   Vector BasisDifference(const ConstVectorRef& eta) const;
 
  private:
+  Matrix HessianOfData(const ConstVectorRef& eta, double spent, bool with_remainder) const;
+  void AddPopulation(const ConstVectorRef& eta, Matrix& hessian) const;
   // EvaluateMany for one block of points.
   void EvaluateBlock(const ConstMatrixRef& etas, VectorRef totals) const;
   bool has_remainder() const { return remainder_.size() > 0; }

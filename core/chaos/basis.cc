@@ -98,38 +98,35 @@ void Basis::EvaluateWithGradient(const ConstVectorRef& xi, VectorRef phi,
   }
 }
 
-Matrix Basis::WeightedHessian(const ConstVectorRef& xi, const ConstVectorRef& weights) const {
-  POLYEST_CHECK(weights.size() == size());
-  const int n = dimension();
-  Vector phi(size());
-  Matrix gradient(size(), n);
-  EvaluateWithGradient(xi, phi, gradient);
-  // Each second[s] is ∇²φ_s, by the same products; only its upper triangle is filled.
-  std::vector<Matrix> second(static_cast<size_t>(size()), Matrix::Zero(n, n));
-  Matrix sum = Matrix::Zero(n, n);
+Matrix Basis::WeightedHessian(const ConstVectorRef& xi, const ConstVectorRef& phi,
+                              const ConstMatrixRef& gradient, const ConstVectorRef& weights) const {
+  POLYEST_CHECK(phi.size() == size() && gradient.rows() == size() && weights.size() == size());
+  // A product φ_s = φ_parent P_j has the Hessian
+  //   P_j ∇²φ_parent + φ_parent ∇²P_j + ∇φ_parent ∇P_jᵀ + ∇P_j ∇φ_parentᵀ,
+  // so that its factors, which come before it, inherit its weight.
+  Vector inherited = weights;
+  Matrix sum = Matrix::Zero(dimension(), dimension());  // its upper triangle, to begin with
+  for (int s = size() - 1; s > 0; --s) {
+    const Term& term = terms_[static_cast<size_t>(s - 1)];
+    if (term.parent == 0) continue;
+    const int k = term.variable;
+    inherited[term.parent] += inherited[s] * phi[term.single];
+    inherited[term.single] += inherited[s] * phi[term.parent];
+    const double factor = inherited[s] * gradient(term.single, k);
+    for (int i = 0; i < k; ++i) sum(i, k) += factor * gradient(term.parent, i);
+  }
+  Vector second = Vector::Zero(size());  // P''_j of the polynomials of one germ alone
   for (int s = 1; s < size(); ++s) {
     const Term& term = terms_[static_cast<size_t>(s - 1)];
+    if (term.parent != 0) continue;
+    // √b_j P''_j = 2 P'_{j−1} + (ξ − a_{j−1}) P''_{j−1} − √b_{j−1} P''_{j−2}
     const int k = term.variable, j = term.degree;
-    Matrix& hessian = second[static_cast<size_t>(s)];
-    if (term.parent != 0) {
-      const double own_second = second[static_cast<size_t>(term.single)](k, k);
-      hessian.topLeftCorner(k, k) =
-          second[static_cast<size_t>(term.parent)].topLeftCorner(k, k) * phi[term.single];
-      for (int i = 0; i < k; ++i) {
-        hessian(i, k) = hessian(k, i) = gradient(term.parent, i) * gradient(term.single, k);
-      }
-      hessian(k, k) = phi[term.parent] * own_second;
-    } else {
-      // √b_j P''_j = 2 P'_{j−1} + (ξ − a_{j−1}) P''_{j−1} − √b_{j−1} P''_{j−2}
-      double value = 2 * gradient(term.previous, k) +
-                     (xi[k] - a_(j - 1, k)) * second[static_cast<size_t>(term.previous)](k, k);
-      if (term.second >= 0) {
-        value -= sqrt_b_(j - 1, k) * second[static_cast<size_t>(term.second)](k, k);
-      }
-      hessian(k, k) = value / sqrt_b_(j, k);
-    }
-    sum += weights[s] * hessian;
+    double value = 2 * gradient(term.previous, k) + (xi[k] - a_(j - 1, k)) * second[term.previous];
+    if (term.second >= 0) value -= sqrt_b_(j - 1, k) * second[term.second];
+    second[s] = value / sqrt_b_(j, k);
+    sum(k, k) += inherited[s] * second[s];
   }
+  sum.triangularView<Eigen::StrictlyLower>() = sum.transpose();
   return sum;
 }
 

@@ -38,8 +38,9 @@ class Basis {
   void Evaluate(const ConstVectorRef& xi, VectorRef phi) const;
   // Writes φ(ξ) into `phi` and its derivatives by ξ into `gradient` (S × n). Does not allocate.
   void EvaluateWithGradient(const ConstVectorRef& xi, VectorRef phi, MatrixRef gradient) const;
-  // Returns Σ_s weights_s ∇²φ_s(ξ), a symmetric n × n matrix.
-  Matrix WeightedHessian(const ConstVectorRef& xi, const ConstVectorRef& weights) const;
+  // Returns Σ_s weights_s ∇²φ_s(ξ), a symmetric n × n matrix, given φ(ξ) and its derivatives by ξ.
+  Matrix WeightedHessian(const ConstVectorRef& xi, const ConstVectorRef& phi,
+                         const ConstMatrixRef& gradient, const ConstVectorRef& weights) const;
   // Evaluates φ at W points: `points` is W × n; `values` becomes W × S and is allocated anew only
   // if its size changes. Vectorized over the points.
   void EvaluateMany(const ConstMatrixRef& points, Matrix& values) const;

@@ -14,7 +14,8 @@ namespace polyest::internal {
 namespace {
 
 constexpr int kStarts = 6;
-constexpr int kCover = 4096;
+// Points of the cover: so many for each parameter, and at most.
+constexpr int kCoverPerParameter = 1024, kMostCover = 4096;
 // Number of points of the cover, and of the guesses, from which starts are taken.
 constexpr Eigen::Index kBest = 256;
 // Another minimum, or a distant point, matters when its cost exceeds the least one by less than the
@@ -43,15 +44,16 @@ class GuardedImportance {
  private:
   // Computes the costs of the cover and the guesses, and the minima found from the best of them.
   void Look() {
+    const int count = std::min(kMostCover, kCoverPerParameter * cost_.dimension());
     const Matrix cover =
-        CoverOfDomain(cost_.region(), cost_.prior(), lower_, upper_, guesses_, kCover);
-    known_.etas.resize(kCover + guesses_.rows(), cost_.dimension());
+        CoverOfDomain(cost_.region(), cost_.prior(), lower_, upper_, guesses_, count);
+    known_.etas.resize(count + guesses_.rows(), cost_.dimension());
     known_.etas << cover, guesses_;
     const DifferentialEvolution box(cost_, lower_, upper_, 0);
     box.Evaluate(known_.etas, known_.costs);
     Matrix starts(0, cost_.dimension());
-    AddStarts(0, kCover, starts);
-    AddStarts(kCover, guesses_.rows(), starts);
+    AddStarts(0, count, starts);
+    AddStarts(count, guesses_.rows(), starts);
     if (starts.rows() == 0) return;
     result_.minima = FindMinimaOf(cost_, search_, starts, stop_);
   }

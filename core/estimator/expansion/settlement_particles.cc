@@ -1,5 +1,6 @@
 #include "core/estimator/expansion/settlement_particles.h"
 
+#include <algorithm>
 #include <random>
 #include <utility>
 #include <vector>
@@ -11,7 +12,8 @@
 namespace polyest::internal {
 namespace {
 
-constexpr int kImportancePoints = 4096;
+// Importance sampling's points: so many for each parameter, and at most.
+constexpr int kPointsPerParameter = 1024, kMostPoints = 4096;
 
 // Resamples systematically, then shuffles: the first particles become check points, and the order
 // of quasi-random points is anything but random.
@@ -32,7 +34,8 @@ absl::StatusOr<Particles> SampleForSettlement(const Cost& cost, const ExpansionD
   SamplerOptions options;
   options.seed = seed;
   const Matrix local = design.region.ManyToLocal(guesses);
-  const GuardedDraws drawn = DrawIfNearlyGaussian(cost, design, local, kImportancePoints, stop);
+  const int points = std::min(kMostPoints, kPointsPerParameter * cost.dimension());
+  const GuardedDraws drawn = DrawIfNearlyGaussian(cost, design, local, points, stop);
   POLYEST_RETURN_IF_ERROR(stop.Check());
   if (drawn.draws) return Resample(*drawn.draws, options.particles, seed);
   Vector lower, upper;

@@ -27,7 +27,7 @@ constexpr uint64_t kSeed = 20'071'121;
 constexpr int kStarts = 6;
 // Importance sampling's points for each parameter, where there are few parameters. 8,192 points in
 // two dimensions give a normal distribution's 2.5 % quantiles to 0.005 standard deviations.
-constexpr int kPointsPerParameter = 4'096;
+constexpr int kPointsPerParameter = 2'048;
 // A cover of the box has so many points for each of importance sampling's. Their effective number
 // must be this fraction of it: a cover of low discrepancy knows means far better than as many
 // random draws.

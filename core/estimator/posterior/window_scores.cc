@@ -119,6 +119,9 @@ std::vector<WindowScore> ScoresByEndedRuns(const ResolvedProblem& problem, const
   const std::vector<ChannelSums> sums = SumsWithRemainder(problem.problem().measured, ended);
   const Vector centre = Vector::Zero(eta.size());
   const ScoreOfTotals scores(ended.windows, sums, *ended.basis, centre, eta);
+  Vector phi(ended.basis->size());
+  Matrix phi_gradient(ended.basis->size(), eta.size());
+  ended.basis->EvaluateWithGradient(eta, phi, phi_gradient);
   std::vector<WindowScore> totals;
   const int64_t rows_of_run = std::max<int64_t>(1, ended.rows / std::ssize(ended.run));
   for (int w = 0; w < ended.windows.count(); ++w) {
@@ -126,7 +129,8 @@ std::vector<WindowScore> ScoresByEndedRuns(const ResolvedProblem& problem, const
     totals.back().span.rows *= rows_of_run;
     // ∂²E/∂η², which is what the prior of the runs' own parameters leaves of their information.
     const Vector remainder = -ended.windows.TotalsAt(w, sums).back().b;
-    totals.back().information += ended.basis->WeightedHessian(eta, remainder);
+    totals.back().information +=
+        ended.basis->WeightedHessian(eta, phi, phi_gradient, remainder);
   }
   Matrix by_germ = Matrix::Zero(eta.size(), problem.dimension());
   by_germ(Eigen::all, shared) = Inverse(ended.region.axes());

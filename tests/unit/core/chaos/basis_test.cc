@@ -133,7 +133,10 @@ TEST(Basis, WeightedHessianIsTheDerivativeOfTheWeightedGradient) {
   const Basis basis(FourFamilies(), 4);
   const Vector xi = InsideAllSupports();
   const Vector weights = Vector::LinSpaced(basis.size(), -1, 1.3);
-  const Matrix hessian = basis.WeightedHessian(xi, weights);
+  Vector values(basis.size());
+  Matrix slopes(basis.size(), 4);
+  basis.EvaluateWithGradient(xi, values, slopes);
+  const Matrix hessian = basis.WeightedHessian(xi, values, slopes, weights);
   EXPECT_TRUE(hessian.isApprox(hessian.transpose(), 1e-15));
   const auto weighted_gradient = [&](const Vector& x) -> Vector {
     Vector phi(basis.size());
@@ -156,7 +159,7 @@ TEST(Basis, OfOrderZeroIsTheConstant) {
   basis.EvaluateWithGradient(xi, phi, gradient);
   EXPECT_EQ(phi[0], 1);
   EXPECT_TRUE(gradient.isZero(0));
-  EXPECT_TRUE(basis.WeightedHessian(xi, Vector::Ones(1)).isZero(0));
+  EXPECT_TRUE(basis.WeightedHessian(xi, phi, gradient, Vector::Ones(1)).isZero(0));
   Matrix values;
   basis.EvaluateMany(Matrix::Zero(5, 2), values);
   EXPECT_TRUE((values.array() == 1).all());
