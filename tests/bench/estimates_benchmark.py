@@ -4,7 +4,8 @@
     estimates_benchmark.py POLYEST [OTHER_POLYEST]... [--repeats N] [--only NAME]... [--data FOLDER]
 
 Prints for each record the CPU time on one thread, beside that of a start of the program, and the runs of
-the model: of each build its fastest of N estimates, then how often the first build's time goes into each
+the model: of each build its fastest of N estimates (or of a
+second's), then how often the first build's time goes into each
 other one's. Records of real hardware that the folder does not hold are left out.
 """
 
@@ -15,7 +16,6 @@ import math
 import pathlib
 import random
 import resource
-import statistics
 import subprocess
 import sys
 import tempfile
@@ -23,6 +23,8 @@ import tempfile
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / "client" / "examples"
 DATA = ROOT.parent / "shared" / "data"
+LEAST_S = 1  # short estimates are repeated for so long
+STARTS = 30
 
 
 def uniform(**bounds):
@@ -149,12 +151,13 @@ def cpu_seconds(command):
 def measure(builds, problem, record, repeats):
     """Returns for each build the least CPU time beside that of its start, s, and the model runs."""
     seconds, runs = [math.inf] * len(builds), [0] * len(builds)
+    first, _ = cpu_seconds(estimate(builds[0], problem, record))
+    repeats = max(repeats, math.ceil(LEAST_S / first))
     for _, (k, build) in itertools.product(range(repeats), enumerate(builds)):
         taken, answer = cpu_seconds(estimate(build, problem, record))
         seconds[k] = min(seconds[k], taken)
         runs[k] = int(json.loads(answer)["expansion"]["trajectories"])
-    starts = [statistics.median(cpu_seconds([build, "--version"])[0] for _ in range(11))
-              for build in builds]
+    starts = [min(cpu_seconds([build, "--version"])[0] for _ in range(STARTS)) for build in builds]
     return [taken - start for taken, start in zip(seconds, starts)], runs
 
 
