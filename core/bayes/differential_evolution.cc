@@ -25,33 +25,44 @@ DifferentialEvolution::DifferentialEvolution(const Cost& cost, const Vector& low
 
 void DifferentialEvolution::Evaluate(const Matrix& etas, Vector& costs) const {
   // Points outside, many where a posterior leans on bounds, are not evaluated at all.
-  thread_local Matrix inside, xis;
+  thread_local Matrix inside;
   thread_local Vector inside_costs;
   thread_local std::vector<Eigen::Index> rows;
-  xis.resize(etas.cols(), etas.rows());  // a point a column
-  xis.noalias() = cost_.region().axes() * etas.transpose();
-  xis.colwise() += cost_.region().centre();
+  const std::vector<int64_t>& allowed = Allowed(etas);
   rows.clear();
   for (Eigen::Index i = 0; i < etas.rows(); ++i) {
-    if (IsInBox(etas, i) && cost_.prior().Contains(xis.col(i))) rows.push_back(i);
+    if (allowed[static_cast<size_t>(i)] != 0) rows.push_back(i);
   }
   if (std::ssize(rows) == etas.rows()) {
     cost_.EvaluateMany(etas, costs);
     return;
   }
-  const auto count = std::ssize(rows);
-  inside.resize(count, etas.cols());
-  for (Eigen::Index k = 0; k < count; ++k) inside.row(k) = etas.row(rows[static_cast<size_t>(k)]);
+  inside = etas(rows, Eigen::all);
   cost_.EvaluateMany(inside, inside_costs);
   costs.setConstant(etas.rows(), std::numeric_limits<double>::infinity());
-  for (Eigen::Index k = 0; k < count; ++k) costs[rows[static_cast<size_t>(k)]] = inside_costs[k];
+  costs(rows) = inside_costs;
 }
 
-bool DifferentialEvolution::IsInBox(const Matrix& etas, Eigen::Index row) const {
+const std::vector<int64_t>& DifferentialEvolution::Allowed(const Matrix& etas) const {
+  thread_local Matrix xis;
+  thread_local std::vector<int64_t> allowed;  // as wide as a number, for the processor's vectors
+  xis.resize(etas.rows(), etas.cols());
+  xis.noalias() = etas * cost_.region().axes().transpose();
+  xis.rowwise() += cost_.region().centre().transpose();
+  allowed.assign(static_cast<size_t>(etas.rows()), 1);
+  // What is not finite is outside of every interval, whose ends may be infinite.
+  constexpr double kLargest = std::numeric_limits<double>::max();
+  const auto allow = [kLargest](const double* values, double lower, double upper) {
+    const double from = std::max(lower, -kLargest), to = std::min(upper, kLargest);
+    for (size_t i = 0; i < allowed.size(); ++i) {
+      allowed[i] &= static_cast<int64_t>(values[i] >= from) & static_cast<int64_t>(values[i] <= to);
+    }
+  };
   for (Eigen::Index j = 0; j < etas.cols(); ++j) {
-    if (!(etas(row, j) >= lower_[j] && etas(row, j) <= upper_[j])) return false;
+    allow(etas.col(j).data(), lower_[j], upper_[j]);
+    allow(xis.col(j).data(), cost_.prior().lower()[j], cost_.prior().upper()[j]);
   }
-  return true;
+  return allowed;
 }
 
 void DifferentialEvolution::Sweep(double beta, Eigen::Index first, Eigen::Index count,

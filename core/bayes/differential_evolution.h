@@ -43,7 +43,9 @@ class DifferentialEvolution {
   Eigen::Index Draw(Eigen::Index count);             // in [0, count)
 
  private:
-  bool IsInBox(const Matrix& etas, Eigen::Index row) const;
+  // Returns for each row of `etas` whether it is in the box and in Ω, 1 or 0; valid until the next
+  // call.
+  const std::vector<int64_t>& Allowed(const Matrix& etas) const;
   // The rows [first, first + count) move by differences of the rows [other, other + other_count).
   struct Halves {
     Eigen::Index first, count, other, other_count;

@@ -35,13 +35,17 @@ class StraightCoordinates {
  private:
   struct Curved {
     int parameter;
-    double sign;             // of θ, if u is its logarithm
-    bool theta_is_affine;    // in the score z
-    double log_theta_slope;  // d log θ/dz if log θ is affine in z, else 0
+    double sign;       // of θ, if u is its logarithm
+    bool of_own_germ;  // whether the score z is the parameter's own germ, so that θ = T(l + s z)
+    double location;   // l
+    double scale;      // s
   };
 
-  // Returns log |dz/du| up to a constant of the parameter.
-  double LogSlope(const Curved& curved, double z, double u) const;
+  // Replace the scores z of a parameter in `column` by u, or u by z, and add log |dz/du|, up to a
+  // constant, to `log_volumes`, unless null.
+  void ToStraight(const Curved& curved, VectorRef column, Vector* log_volumes) const;
+  void FromStraight(const Curved& curved, VectorRef column, Vector& log_volumes) const;
+  double LogSlope(const Curved& curved, double z, double u) const;  // log |dz/du| by the prior
 
   const Prior& prior_;
   const Region& region_;

@@ -129,8 +129,7 @@ std::vector<WindowScore> ScoresByEndedRuns(const ResolvedProblem& problem, const
     totals.back().span.rows *= rows_of_run;
     // ∂²E/∂η², which is what the prior of the runs' own parameters leaves of their information.
     const Vector remainder = -ended.windows.TotalsAt(w, sums).back().b;
-    totals.back().information +=
-        ended.basis->WeightedHessian(eta, phi, phi_gradient, remainder);
+    totals.back().information += ended.basis->WeightedHessian(eta, phi, phi_gradient, remainder);
   }
   Matrix by_germ = Matrix::Zero(eta.size(), problem.dimension());
   by_germ(Eigen::all, shared) = Inverse(ended.region.axes());
