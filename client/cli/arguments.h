@@ -8,6 +8,7 @@
 #include <variant>
 #include <vector>
 
+#include "client/cli/place.h"
 #include "client/cli/screen.h"
 #include "client/paper/paper_command.h"
 #include "polyest/data_file.h"
@@ -15,25 +16,6 @@
 namespace polyest::internal {
 
 enum class Format { kTable, kJson, kJsonLines, kCsv };
-
-// Files and names for access to a daemon; an empty field is not used.
-struct ServerAccess {
-  std::string ca_file;
-  std::string certificate_file;
-  std::string key_file;
-  std::string server_name;
-  std::string token_file;
-};
-
-// Place where a command computes: a daemon or this process.
-struct Place {
-  std::string server;        // HOST:PORT; empty: in this process
-  ServerAccess access;       // access to the server
-  double deadline_s = 0;     // longest duration, s; 0: no limit
-  int threads = 1;           // threads for computing in this process
-  std::string fmu_dir;       // folder of FMUs for this process; empty: none
-  std::string umbridge_dir;  // likewise, of descriptions of models of UM-Bridge servers
-};
 
 struct EstimateArguments {
   Place place;

@@ -21,11 +21,7 @@ class LocalBackend : public Backend {
       : threads_(place.threads),
         models_(OpenModels(place)),
         line_([this] { return WithTask(progress_->Describe()); }) {
-    if (place.deadline_s > 0) {
-      const std::chrono::duration<double> length(place.deadline_s);
-      stop_ =
-          Stop({}, Stop::Clock::now() + std::chrono::duration_cast<Stop::Clock::duration>(length));
-    }
+    if (place.End()) stop_ = Stop({}, place.End());
   }
 
   absl::StatusOr<v1::ComputeEstimateResponse> ComputeEstimate(
@@ -175,10 +171,7 @@ std::string Backend::WithTask(const std::string& progress) const {
 
 ClientOptions ToClientOptions(const Place& place) {
   ClientOptions options;
-  if (place.deadline_s > 0) {
-    options.deadline = std::chrono::ceil<std::chrono::milliseconds>(
-        std::chrono::duration<double>(place.deadline_s));
-  }
+  options.end = place.End();
   const ServerAccess& access = place.access;
   if (!access.ca_file.empty() || !access.certificate_file.empty() || !access.server_name.empty()) {
     options.tls =

@@ -13,6 +13,7 @@
 #include "client/cli/commands.h"
 #include "client/cli/draft_file.h"
 #include "client/cli/exit_status.h"
+#include "client/cli/number_format.h"
 #include "core/common/check.h"
 #include "core/common/status.h"
 
@@ -76,8 +77,8 @@ absl::StatusOr<v1::BackupSummary> BackUp(const BackupArguments& arguments) {
 int RunCommand(const BackupArguments& arguments, std::ostream& out, std::ostream& err) {
   const auto summary = BackUp(arguments);
   if (!summary.ok()) return Report(summary.status(), arguments.place.server, err);
-  out << absl::StrFormat("backed up %d sessions with %d batches, %.1f MB, to %s\n",
-                         summary->session_count(), summary->batch_count(),
+  out << absl::StrFormat("backed up %s with %d batches, %.1f MB, to %s\n",
+                         Counted(summary->session_count(), "session"), summary->batch_count(),
                          1e-6 * static_cast<double>(summary->size_bytes()), arguments.output_file)
       << std::flush;
   for (const std::string& damage : summary->damage()) {

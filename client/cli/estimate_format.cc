@@ -187,9 +187,10 @@ void PrintSummary(const v1::Estimate& estimate, std::ostream& out) {
                          cost.mismatch(), estimate.regularization(), cost.prior());
   const v1::ExpansionSummary& e = estimate.expansion();
   std::string expansion = absl::StrFormat(
-      "expansion: order %d, %d terms, %d points, %d re-expansions, %d "
-      "trajectories; differs from the model by %.2g of the noise",
-      e.order(), e.terms(), e.points(), e.reexpansions(), e.trajectories(), e.residual_to_noise());
+      "expansion: order %d, %d terms, %d points, %s, %d trajectories; differs from the model by "
+      "%.2g of the noise",
+      e.order(), e.terms(), e.points(), Counted(e.reexpansions(), "re-expansion"), e.trajectories(),
+      e.residual_to_noise());
   if (e.has_pareto_shape()) {
     absl::StrAppendFormat(&expansion, "; Pareto shape of the model's weights %.2f",
                           e.pareto_shape());

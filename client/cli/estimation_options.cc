@@ -1,5 +1,7 @@
 // Adds the commands that estimate from measurements and those that study an estimate.
 
+#include <absl/strings/str_cat.h>
+
 #include <charconv>
 #include <memory>
 #include <string>
@@ -9,6 +11,8 @@
 
 namespace polyest::internal {
 namespace {
+
+constexpr size_t kMaxCompared = 19;  // problems
 
 // One point spans no axis, which a range from 0 would allow.
 std::string CheckGridPoints(const std::string& text) {
@@ -92,8 +96,8 @@ void AddTimesOfFit(CLI::App& command, FitArguments& arguments) {
       ->check(Between(0.0, 1e9));
   command.add_flag(
       "--smoothed", arguments.smoothed,
-      "With process noise or drift: what all samples say of each row, those after it, too;\n"
-      "shows what parameters that drift have been");
+      "With process noise or drift: use all samples of the run for each row, also later ones;\n"
+      "shows the past values of parameters that drift");
   command
       .add_option("--forecast", arguments.forecast_s,
                   "Predict so many seconds beyond the last row, in place of the rows")
@@ -143,15 +147,22 @@ void AddCompare(CommandRegistry& registry) {
                     "compare perfect.json filtered.json data.csv --horizon 10"},
        .notes =
            "The evidence is the probability that a problem gives to all samples before it has\n"
-           "seen them; a difference of 3 in its logarithm are odds of 20 to 1. The score is the\n"
+           "seen them; a difference of 3 in its logarithm means odds of 20 to 1. The score is the\n"
            "log probability of the last rows, predicted by an estimate from the rows before.\n"
            "Filters go on reading samples meanwhile, so that they win a few rows ahead; ask for\n"
            "the --horizon that you need. Problems must measure the same samples, with noise of\n"
            "unknown size in the same outputs or in none."},
       arguments);
-  command.add_option("files", arguments->files, "Problem files, then the data file")
+  command.add_option("files", arguments->files, "Two to 19 problem files, then the data file")
+      ->option_text("PROBLEM PROBLEM… DATA REQUIRED")
       ->required()
-      ->expected(3, 20);
+      ->expected(3, CLI::detail::expected_max_vector_size);
+  command.callback([arguments] {
+    const size_t problems = arguments->files.size() - 1;
+    if (problems <= kMaxCompared) return;
+    throw CLI::ValidationError("files",
+                               absl::StrCat(problems, " problems are more than ", kMaxCompared));
+  });
   AddDataOptions(command, arguments->data_options);
   command
       .add_option("--hold-out", arguments->hold_out.fraction,

@@ -4,12 +4,34 @@
 #include <absl/strings/str_replace.h>
 
 #include <optional>
+#include <string>
+#include <utility>
 
 #include "core/common/field_error.h"
 #include "polyest/v1/problem.pb.h"
 
 namespace polyest::internal {
 namespace {
+
+// The options of commands that fill fields of requests, by the fields' names in JSON.
+constexpr std::pair<absl::string_view, absl::string_view> kOptions[] = {
+    {"drawCount", "--draws"},   {"forecastS", "--forecast"}, {"highest", "--highest"},
+    {"horizonS", "--horizon"},  {"joints", "--joint"},       {"lowest", "--lowest"},
+    {"maxRowCount", "--rows"},  {"outputs", "--outputs"},    {"parameters", "--parameter"},
+    {"pointCount", "--points"}, {"possible", "--outputs"},   {"probabilities", "--quantiles"},
+    {"sessionId", "--session"}, {"smoothed", "--smoothed"},  {"sampleCount", "--samples"},
+    {"stepS", "--step"},        {"untilS", "--until"},
+};
+
+// Returns the message of a status, which names the option in place of the field that it fills.
+std::string MessageOf(const absl::Status& status) {
+  const std::optional<FieldPath> field = FieldOf(status);
+  for (const auto& [name, option] : kOptions) {
+    if (!field || field->empty() || field->steps().front().text() != name) continue;
+    return absl::StrCat(option, ": ", SentenceOf(status));
+  }
+  return std::string(status.message());
+}
 
 bool IsFieldOfProblem(const FieldStep& step) {
   const google::protobuf::Descriptor& problem = *v1::Problem::descriptor();
@@ -49,7 +71,7 @@ ExitStatus ExitStatusOf(const absl::Status& status, absl::string_view server) {
 
 int Report(const absl::Status& status, absl::string_view server, std::ostream& err) {
   const ExitStatus exit_status = ExitStatusOf(status, server);
-  std::string message = absl::StrReplaceAll(status.message(), {{"\r", ""}, {"\n", " "}});
+  std::string message = absl::StrReplaceAll(MessageOf(status), {{"\r", ""}, {"\n", " "}});
   if (message.empty()) message = absl::StatusCodeToString(status.code());
   if (exit_status == kExitServer) message = absl::StrCat("server ", server, ": ", message);
   err << "polyest: " << message << std::endl;

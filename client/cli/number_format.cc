@@ -78,6 +78,10 @@ std::string FormatExact(double value) {
   return std::string(text, result.ptr);
 }
 
+std::string Counted(int64_t count, const std::string& what) {
+  return absl::StrCat(count, " ", what, count == 1 ? "" : "s");
+}
+
 std::string UnitText(const std::string& unit) { return unit == "1" ? "" : unit; }
 
 std::string NameWithUnit(const std::string& name, const std::string& unit) {

@@ -2,6 +2,7 @@
 
 // Formats numbers and their units for readers.
 
+#include <cstdint>
 #include <string>
 
 namespace polyest::internal {
@@ -19,6 +20,8 @@ std::string FormatInterval(double lower, double upper, double standard_deviation
 std::string FormatNumber(double value, int digits = 4);
 // Returns a probability as "97.5 %".
 std::string FormatPercent(double probability);
+// Returns "1 session" or "2 sessions" for "session".
+std::string Counted(int64_t count, const std::string& what);
 // Returns a unit as it is printed: nothing for the plain number's "1".
 std::string UnitText(const std::string& unit);
 // Returns "x (m)", or the name alone for a plain number.

@@ -1,9 +1,13 @@
 // Adds the commands for the time before measurements, and the commands `schema` and `paper`.
 
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_join.h>
+
 #include <memory>
 
 #include "client/cli/command_registry.h"
 #include "client/cli/shared_options.h"
+#include "client/paper/experiments.h"
 
 namespace polyest::internal {
 namespace {
@@ -139,7 +143,9 @@ void AddOtherCommands(CommandRegistry& registry) {
                                     .summary = "Rerun the paper's experiments",
                                     .examples = {"paper 14 --plot figure14.svg"}},
                                    paper);
-  command.add_option("figure", paper->figure, "One experiment's name (default: all)");
+  command.add_option(
+      "figure", paper->figure,
+      absl::StrCat("One experiment's name (default: all): ", absl::StrJoin(PaperFigures(), ", ")));
   command.add_option("--plot", paper->plot_file, "Draw the figure into this .svg or .png file");
   AddThreads(command, paper->threads);
 }

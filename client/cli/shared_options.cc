@@ -80,7 +80,9 @@ CLI::Validator Between(double least, double most) {
 }
 
 CLI::Option* AddServer(CLI::App& command, Place& place) {
-  command.add_option("--deadline", place.deadline_s, "Give up after this many seconds; 0: never")
+  command
+      .add_option("--deadline", place.deadline_s,
+                  "Give up this many seconds after the start; 0: never")
       ->check(Between(0.0, 1e9));
   AddAccess(command, place.access);
   return command.add_option("--server", place.server, "The daemon to ask, HOST:PORT")

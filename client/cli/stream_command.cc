@@ -43,7 +43,9 @@ constexpr std::chrono::milliseconds kMaxPause{5'000};
 // Delays batches by the times of their rows.
 class Pace {
  public:
-  Pace(double rate, const Interrupt& interrupt) : rate_(rate), interrupt_(interrupt) {}
+  // Does not delay beyond `end`.
+  Pace(double rate, const Interrupt& interrupt, std::optional<Place::Clock::time_point> end)
+      : rate_(rate), interrupt_(interrupt), end_(end.value_or(Place::Clock::time_point::max())) {}
 
   // Waits until the time at which the last row of the batch would have been measured. Runs follow
   // one another without a pause.
@@ -57,14 +59,15 @@ class Pace {
       time_s_ = batch.time_s(row);
     }
     const std::chrono::duration<double> due(elapsed_s_ / rate_);
-    interrupt_.WaitUntil(start_ +
-                         std::chrono::duration_cast<std::chrono::steady_clock::duration>(due));
+    interrupt_.WaitUntil(
+        std::min(end_, start_ + std::chrono::duration_cast<Place::Clock::duration>(due)));
   }
 
  private:
   const double rate_;
   const Interrupt& interrupt_;
-  const std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+  const Place::Clock::time_point end_;
+  const Place::Clock::time_point start_ = Place::Clock::now();
   double elapsed_s_ = 0;
   int run_ = -1;  // before the first row
   double time_s_ = 0;
@@ -185,7 +188,7 @@ class StreamCommand {
     if (isatty(STDERR_FILENO) != 0) {
       line_->Interject([&] { err_ << "streaming to " << session.name << std::endl; });
     }
-    Pace pace(arguments_.rate, interrupt_);
+    Pace pace(arguments_.rate, interrupt_, arguments_.place.End());
     while (batch.time_s_size() > 0) {
       progress_.AddRows(batch.time_s_size());
       if (session.resumed_after) skipped_ += RemoveRowsUpTo(*session.resumed_after, batch);

@@ -53,6 +53,19 @@ std::string RefusedField(const rpc::Status& detailed) {
   return "";
 }
 
+// Returns when a call that begins now must have ended, on a clock that is never set back.
+std::optional<gpr_timespec> EndOfCall(
+    const std::optional<std::chrono::milliseconds>& longest,
+    const std::optional<std::chrono::steady_clock::time_point>& end) {
+  using std::chrono::nanoseconds;
+  if (!longest && !end) return std::nullopt;
+  auto left = nanoseconds::max();
+  if (longest && *longest < left) left = *longest;
+  if (end) left = std::min<nanoseconds>(left, *end - std::chrono::steady_clock::now());
+  return gpr_time_add(gpr_now(GPR_CLOCK_MONOTONIC),
+                      gpr_time_from_nanos(left.count(), GPR_TIMESPAN));
+}
+
 }  // namespace
 
 absl::Status FromGrpc(const grpc::Status& status) {
@@ -88,9 +101,13 @@ Client::Client(const std::string& server, ClientOptions options)
 
 void Client::Prepare(grpc::ClientContext& call) const {
   connection_->Identify(call);
-  if (!options_.deadline) return;
-  call.set_deadline(gpr_time_add(gpr_now(GPR_CLOCK_MONOTONIC),
-                                 gpr_time_from_millis(options_.deadline->count(), GPR_TIMESPAN)));
+  const auto end = EndOfCall(options_.deadline, options_.end);
+  if (end) call.set_deadline(*end);
+}
+
+void Client::LimitToEnd(grpc::ClientContext& call) const {
+  const auto end = EndOfCall(std::nullopt, options_.end);
+  if (end) call.set_deadline(*end);
 }
 
 absl::Status Client::StatusOf(const grpc::Status& status) const {

@@ -59,6 +59,7 @@ class MeasurementStream::Connection
     if (stream_.options_.estimates) *hello->mutable_estimates() = *stream_.options_.estimates;
     authorization_ = stream_.client_.Authorization();
     if (!authorization_.empty()) context_.AddMetadata("authorization", authorization_);
+    stream_.client_.LimitToEnd(context_);
     stream_.client_.sessions().async()->StreamMeasurements(&context_, this);
     StartRead(&response_);
     Write(std::move(hello));

@@ -60,9 +60,9 @@ class NewtonSearch {
 
   std::optional<Vector> From(Vector eta) {
     if (!limits_.Allow(eta)) return std::nullopt;
-    const Eigen::Index most_steps = kMaxSteps + 2 * eta.size();
+    const Eigen::Index max_steps = kMaxSteps + 2 * eta.size();
     Vector gradient(eta.size());
-    for (Eigen::Index step = 0; step < most_steps; ++step) {
+    for (Eigen::Index step = 0; step < max_steps; ++step) {
       const double value = cost_.EvaluateWithGradient(eta, gradient).total;
       if (!std::isfinite(value) || !gradient.allFinite()) return std::nullopt;
       if (step == 0) KeepTo(eta, gradient);

@@ -29,7 +29,8 @@ class FactoredSums {
 
   int rank() const { return static_cast<int>(Factor().cols()); }
 
-  // As those of MismatchSums, for single points: through F where that is less work.
+  // Return χ² at one point, whose d has S numbers, and write its derivatives by d into `gradient`
+  // (S): through F where that is less work than through G.
   double ChiSquared(const ConstVectorRef& d) const;
   double ChiSquaredWithGradient(const ConstVectorRef& d, VectorRef gradient) const;
   // Returns ∂φᵀ G ∂φ, n × n; `phi_gradient` = ∂φ is S × n.

@@ -64,8 +64,8 @@ Proposal MakeProposal(int dimension, int points) {
 // Returns the proposal, which is the same for all posteriors and takes longer to make than the
 // costs of a small problem. Those of usual sizes are kept, at most 16 MB.
 std::shared_ptr<const Proposal> ProposalOf(int dimension, int points) {
-  constexpr int kMostDimensions = 12, kMostPoints = 16'384;
-  if (dimension > kMostDimensions || points > kMostPoints) {
+  constexpr int kMaxKeptDimensions = 12, kMaxKeptPoints = 16'384;
+  if (dimension > kMaxKeptDimensions || points > kMaxKeptPoints) {
     return std::make_shared<const Proposal>(MakeProposal(dimension, points));
   }
   static std::mutex mutex;

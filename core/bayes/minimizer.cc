@@ -232,11 +232,11 @@ Vector PrepareStart(UnitProblem& problem, const Vector& start) {
 
 // Returns the point, put on the bounds that it missed by rounding unless f is infinite there.
 Vector OnBounds(UnitProblem& problem, const Vector& u) {
-  constexpr double kMostMissed = 1e-12;
+  constexpr double kMaxMissed = 1e-12;
   Vector snapped = u;
   for (double& value : snapped) {
-    if (value < kMostMissed) value = 0;
-    if (value > 1 - kMostMissed) value = 1;
+    if (value < kMaxMissed) value = 0;
+    if (value > 1 - kMaxMissed) value = 1;
   }
   return std::isfinite(problem.Value(snapped, nullptr)) ? snapped : u;
 }

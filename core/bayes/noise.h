@@ -58,8 +58,8 @@ inline double DegreesFactor(OutlierHandling outliers) {
 // A sample of less weight counts as an outlier: |u| > √6 for Student's t, |u| > 2.69 for Huber.
 inline constexpr double kOutlierWeight = 0.5;
 
-// As DegreesFactor, of the samples that are no outliers: E[w u² | no outlier]/VarianceFactor. How
-// many gross errors there are and how large nobody knows, so that no χ² of all samples can be
+// Returns DegreesFactor for the samples that are no outliers, E[w u² | no outlier]/VarianceFactor.
+// How many gross errors there are and how large nobody knows, so that no χ² of all samples can be
 // expected, but the others have a truncated normal distribution whatever the outliers are.
 inline double InlierDegreesFactor(OutlierHandling outliers) {
   switch (outliers) {
@@ -92,7 +92,7 @@ inline double OutlierDegrees(OutlierHandling outliers) {
   return 1;
 }
 
-// As DegreesFactor, with OutlierDegrees for outliers.
+// Returns DegreesFactor for samples of which outliers count OutlierDegrees.
 inline double BoundedDegreesFactor(OutlierHandling outliers) {
   // P(|u| > √6) and P(|u| > 2.69)
   const double share = outliers == OutlierHandling::kStudentT ? 0.0143060669

@@ -14,7 +14,7 @@ namespace {
 // wherever the cost is evaluated.
 constexpr double kFarthestSpread = 100;
 
-using Components = Eigen::Array<double, Eigen::Dynamic, 1, 0, ScoreMixture::kMostComponents, 1>;
+using Components = Eigen::Array<double, Eigen::Dynamic, 1, 0, ScoreMixture::kMaxComponents, 1>;
 
 // One run's f, with its derivatives with respect to c, μ and λ = log s.
 struct RunTerm {

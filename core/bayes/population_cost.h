@@ -32,7 +32,7 @@ struct RunScore {
 // The shape of a run's posterior about its mean: Gaussians of the same width `step` at the offsets
 // first, first + step, … from it. Without components it is one Gaussian.
 struct ScoreMixture {
-  static constexpr int kMostComponents = 96;
+  static constexpr int kMaxComponents = 96;
 
   double first = 0;
   double step = 0;

@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kFloor = 300;  // below the largest log L
 // Difference of four neighbours from which on the likelihood is not smooth but ends there.
-constexpr double kMostCurved = 20;
+constexpr double kMaxCurved = 20;
 constexpr double kFarthest = 9;          // score, beyond which there is no posterior
 constexpr double kGaussianReach = 4;     // standard deviations
 constexpr double kGaussianError = 1e-3;  // of the logarithm of the density
@@ -77,7 +77,7 @@ double ScoreLikelihood::LogAt(double g) const {
   const auto left = std::min(static_cast<Eigen::Index>(place), last - 1);
   const auto at = std::clamp<Eigen::Index>(left - 1, 0, last - 3);
   const auto four = log_.segment(at, 4);
-  if (four.maxCoeff() - four.minCoeff() > kMostCurved) {
+  if (four.maxCoeff() - four.minCoeff() > kMaxCurved) {
     return log_[left] + (place - static_cast<double>(left)) * (log_[left + 1] - log_[left]);
   }
   const double x = place - static_cast<double>(at);
@@ -129,8 +129,8 @@ Vector ScoreLikelihood::Centres() const {
   };
   const double lower = reach(-1), upper = reach(1);
   const auto wanted = std::lround((upper - lower) / (kDistance * deviation)) + 1;
-  return Vector::LinSpaced(std::clamp<Eigen::Index>(wanted, 4, ScoreMixture::kMostComponents),
-                           lower, upper);
+  return Vector::LinSpaced(std::clamp<Eigen::Index>(wanted, 4, ScoreMixture::kMaxComponents), lower,
+                           upper);
 }
 
 ScoreMixture ScoreLikelihood::Mixture() const {

@@ -7,7 +7,7 @@ namespace {
 
 // The greatest scale of log θ for sums. The θ of a wider prior is so skewed that the difference of
 // two draws hardly ever leads from a third to a probable value.
-constexpr double kMostSkewed = 1;
+constexpr double kMaxSkewed = 1;
 
 // Whether a score is quickly mapped to the parameter. The quantiles of other correlated parameters
 // would take longer than the cost itself.
@@ -24,7 +24,7 @@ StraightCoordinates::StraightCoordinates(const Prior& prior, const Region& regio
     const Germ germ(parameter.germ);
     const Germ& used = prior.germs()[static_cast<size_t>(i)];
     if ((parameter.map == map && used == germ) || !IsQuick(germ, used)) continue;
-    if (parameter.map == ParameterMap::kExponential && parameter.scale > kMostSkewed &&
+    if (parameter.map == ParameterMap::kExponential && parameter.scale > kMaxSkewed &&
         map == ParameterMap::kAffine) {
       continue;
     }

@@ -62,7 +62,7 @@ class BidiagonalSpectrum {
 };
 
 // The decomposition of larger matrices takes long.
-constexpr Eigen::Index kMostDirect = 256;
+constexpr Eigen::Index kMaxDirect = 256;
 // Steps after which the extreme singular values of any matrix are known to about a percent
 // (Kuczynski and Wozniakowski, SIAM Journal on Matrix Analysis and Applications 13, 1992).
 constexpr Eigen::Index kSteps = 60;
@@ -116,7 +116,7 @@ double LargestSingularValue(Eigen::Index size, const Apply& apply,
 
 Conditioning ConditioningOfTriangular(const Matrix& upper) {
   const Eigen::Index size = upper.cols();
-  if (size <= kMostDirect) return ConditioningOf(upper);
+  if (size <= kMaxDirect) return ConditioningOf(upper);
   Conditioning result{0, std::numeric_limits<double>::infinity()};
   const double scale = upper.cwiseAbs().maxCoeff();
   if (!upper.allFinite() || scale == 0) return result;

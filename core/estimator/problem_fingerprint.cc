@@ -25,7 +25,7 @@ void Add(Archive& archive, const std::vector<Quantity>& quantities) {
 }
 
 void Add(Archive& archive, const ModelDescription& model) {
-  archive(model.name, model.equations);
+  archive(model.name, model.equations, model.identity);
   for (const auto* quantities : {&model.states, &model.parameters, &model.inputs, &model.outputs}) {
     Add(archive, *quantities);
   }

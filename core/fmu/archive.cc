@@ -4,6 +4,7 @@
 #include <absl/strings/str_split.h>
 #include <sys/stat.h>
 #include <zip.h>
+#include <zlib.h>
 
 #include <array>
 #include <fstream>
@@ -104,6 +105,20 @@ absl::Status Archive::CheckEntries() const {
 
 bool Archive::Contains(const std::string& entry) const {
   return zip_name_locate(archive_.get(), entry.c_str(), 0) >= 0;
+}
+
+uint32_t Archive::Checksum() const {
+  const auto entries = static_cast<zip_uint64_t>(zip_get_num_entries(archive_.get(), 0));
+  uLong checksum = 0;
+  for (zip_uint64_t i = 0; i < entries; ++i) {
+    zip_stat_t entry;
+    zip_stat_init(&entry);
+    zip_stat_index(archive_.get(), i, 0, &entry);
+    const std::string text = absl::StrFormat("%s %d %d\n", entry.name == nullptr ? "" : entry.name,
+                                             entry.size, entry.crc);
+    checksum = crc32_z(checksum, reinterpret_cast<const Bytef*>(text.data()), text.size());
+  }
+  return static_cast<uint32_t>(checksum);
 }
 
 absl::StatusOr<std::string> Archive::Read(const std::string& entry, int64_t max_bytes) const {

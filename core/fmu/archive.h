@@ -28,6 +28,8 @@ class Archive {
                                       const ArchiveLimits& limits = {});
 
   bool Contains(const std::string& entry) const;
+  // Returns a checksum of the names and contents of all entries, as the archive states them.
+  uint32_t Checksum() const;
   // Returns the text of an entry. Returns FailedPrecondition if there is no such entry, if it has
   // more than `max_bytes` bytes, or if it is damaged.
   absl::StatusOr<std::string> Read(const std::string& entry, int64_t max_bytes) const;

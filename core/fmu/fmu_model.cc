@@ -1,6 +1,7 @@
 #include "core/fmu/fmu_model.h"
 
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
 
 #include <utility>
 
@@ -24,6 +25,8 @@ absl::StatusOr<FmuDescription> ReadDescription(const Archive& archive, const std
     return absl::FailedPreconditionError(
         absl::StrCat("the archive has no ", library, ": export it for 64-bit Linux"));
   }
+  description.model.identity =
+      absl::StrFormat("%s %08x", description.interface.token, archive.Checksum());
   return description;
 }
 
@@ -38,7 +41,7 @@ absl::Status UnpackInto(const std::filesystem::path& file, UnpackedFmu& fmu) {
   const std::string& name = fmu.description.interface.name;
   const absl::StatusOr<FmuDescription> now = ReadDescription(*archive, name);
   if (!now.ok()) return absl::UnavailableError(now.status().message());
-  if (now->interface.token != fmu.description.interface.token) {
+  if (now->model.identity != fmu.description.model.identity) {
     return absl::UnavailableError("the file was replaced in the meantime; try again");
   }
   POLYEST_ASSIGN_OR_RETURN(fmu.folder, TemporaryFolder::Make());

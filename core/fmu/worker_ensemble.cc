@@ -53,13 +53,13 @@ WorkerEnsemble::~WorkerEnsemble() { of_one_trajectory -= reserved_; }
 absl::Status WorkerEnsemble::Reserve(int workers) {
   const int before = of_one_trajectory.fetch_add(workers);
   reserved_ = workers;
-  if (before + workers <= kMostOfOneTrajectory) return absl::OkStatus();
+  if (before + workers <= kMaxOfOneTrajectory) return absl::OkStatus();
   of_one_trajectory -= workers;
   reserved_ = 0;
   return absl::ResourceExhaustedError(absl::StrFormat(
       "fmu %s: it can be instantiated only once per process and cannot save its state, so that its "
       "%d trajectories need as many processes; there may be %d of that kind, and %d are in use",
-      fmu_->description.interface.name, workers, kMostOfOneTrajectory, before));
+      fmu_->description.interface.name, workers, kMaxOfOneTrajectory, before));
 }
 
 absl::Status WorkerEnsemble::StartWorkers() {

@@ -7,7 +7,7 @@
 //
 // Where a process can hold one instance only, whose state cannot be saved, each point has a worker
 // of its own, and as many of them as there may be threads work at a time. All ensembles of this
-// process together have at most kMostOfOneTrajectory such workers.
+// process together have at most kMaxOfOneTrajectory such workers.
 
 #include <absl/status/status.h>
 
@@ -23,7 +23,7 @@ namespace polyest::internal {
 
 class WorkerEnsemble final : public TrajectoryEnsemble {
  public:
-  static constexpr int kMostOfOneTrajectory = 256;
+  static constexpr int kMaxOfOneTrajectory = 256;
   // Calls of an FMU cost so much more than the arithmetic of an integrator that small blocks, which
   // several workers can share, are better than wide ones.
   static constexpr int kPointsOfBlock = 16;

@@ -82,7 +82,7 @@ class EnsembleBlocks {
     std::ranges::sort(failures_, {}, &PointFailure::point);
   }
 
-  // As those of TrajectoryEnsemble.
+  // Return what Restore needs to go on from here, and go on from there, as TrajectoryEnsemble's do.
   std::optional<EnsembleState> State() const {
     if (!AtCheckpoint()) return std::nullopt;
     EnsembleState state{.samples = samples_, .time_s = time_s_, .blocks = {}};

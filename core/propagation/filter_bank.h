@@ -41,7 +41,8 @@ class FilterBank {
   // As FilterBlock::PredictOutputs and TakeStatesOf, for all members.
   absl::Status Predict(double time_s, MatrixRef means, MatrixRef deviations, const Stop& stop);
   void TakeStatesOf(const FilterBank& other);
-  // As those of FilterBlock, for all members; ReadMarked fails if the model's code is lost.
+  // Go through the samples backward and read what all of them tell of earlier times, as FilterBlock
+  // describes it, for all members. ReadMarked fails if the model's code is lost.
   void StartBackward();
   absl::Status Mark(double time_s, const Stop& stop);
   void FinishBackward();
@@ -55,7 +56,7 @@ class FilterBank {
   // The failures so far, ordered by member.
   const std::vector<PointFailure>& failures() const { return failures_; }
 
-  // As those of TrajectoryEnsemble.
+  // Return what Restore needs to go on from here, and go on from there, as TrajectoryEnsemble's do.
   std::optional<EnsembleState> State() const;
   bool Restore(const EnsembleState& state);
 

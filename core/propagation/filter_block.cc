@@ -66,7 +66,7 @@ FilterBlock::FilterBlock(const EnsembleSpecification& specification, const Input
       spread_(members),
       whitened_(members),
       alive_(static_cast<size_t>(members), true) {
-  part_ends_s_.reserve(kMostEvenParts);
+  part_ends_s_.reserve(kMaxEvenParts);
   gaussians_.mean() = points_.topRows(members);
   for (int i = 0; i < members; ++i) {
     if ((spectral_densities_.row(i) >= 0).all() && spectral_densities_.row(i).isFinite().all()) {

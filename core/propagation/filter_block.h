@@ -92,7 +92,8 @@ class FilterBlock {
   // The states that the samples so far tell, of each of the block's members.
   const GaussianStates& states() const { return gaussians_; }
 
-  // As those of TrajectoryBlock, with means and factors beside the states in the first rows.
+  // Begin the integration anew, return the block's state, tell whether one fits, and take it, as
+  // TrajectoryBlock's do. The first rows of the states are the means and factors.
   void Restart() { block_.Restart(); }
   EnsembleState::OfBlock State() const;
   bool Fits(const EnsembleState::OfBlock& state) const;

@@ -32,7 +32,7 @@ class LinearIntegrator final : public BlockIntegrator {
   }
 
  private:
-  static constexpr size_t kMostKept = 8;
+  static constexpr size_t kMaxKept = 8;
   static constexpr size_t kRemembered = 16;
 
   struct Kept {
@@ -129,7 +129,7 @@ bool LinearIntegrator::ComesAgain(double length_s, double tolerance_s) {
 }
 
 const ExactStep* LinearIntegrator::Keep(double length_s) {
-  if (kept_.size() < kMostKept) {
+  if (kept_.size() < kMaxKept) {
     kept_.emplace_back();
   } else {
     std::swap(*std::ranges::min_element(kept_, {}, &Kept::last_use), kept_.back());

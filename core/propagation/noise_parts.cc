@@ -22,14 +22,14 @@ void DivideForNoise(double start_s, double end_s, double rate, std::vector<doubl
   ends_s.clear();
   const double interval_s = end_s - start_s;
   const double parts = std::ceil(interval_s * rate);
-  if (!std::isfinite(parts)) return DivideEvenly(start_s, end_s, kMostEvenParts, ends_s);
-  if (parts <= kMostEvenParts) {
+  if (!std::isfinite(parts)) return DivideEvenly(start_s, end_s, kMaxEvenParts, ends_s);
+  if (parts <= kMaxEvenParts) {
     return DivideEvenly(start_s, end_s, std::max(1, static_cast<int>(parts)), ends_s);
   }
   const double shortest_s = std::max(1 / rate, kLeastPart * interval_s);
   for (double left_s = 0; left_s < interval_s;) {
     ends_s.push_back(end_s - left_s);
-    left_s += std::max(shortest_s, left_s / kMostEvenParts);
+    left_s += std::max(shortest_s, left_s / kMaxEvenParts);
   }
   std::ranges::reverse(ends_s);
 }

@@ -35,10 +35,10 @@ bool SwitchingIntegrator::IsRounding(Eigen::Index row) {
 
 void SwitchingIntegrator::JudgeFull(Eigen::Index row) {
   RowProgress& at = row_of(row);
-  constexpr int kMostRejectionsByLook = 8;
+  constexpr int kMaxRejectionsByLook = 8;
   const double error = ErrorOf(row);
   double look_error = error > 1 ? 0 : looks_.Error(row);
-  if (at.rejections_by_look >= kMostRejectionsByLook) look_error = std::min(look_error, 1.0);
+  if (at.rejections_by_look >= kMaxRejectionsByLook) look_error = std::min(look_error, 1.0);
   const double worst = std::max(error, look_error);
   const double factor = std::clamp(0.9 * std::pow(worst, -0.2), 0.2, 5.0);
   const double length_s = at.trial_s;
@@ -61,9 +61,9 @@ void SwitchingIntegrator::JudgeFull(Eigen::Index row) {
   at.full_s = length_s;
   at.trial_s = crossing.theta * length_s;
   // What comes after the switching may be as short as what came before.
-  constexpr double kMostGrowth = 32;
+  constexpr double kMaxGrowth = 32;
   at.next_s =
-      std::min({length_s, length_s * factor, std::max(kMostGrowth * at.trial_s, Resolution(at))});
+      std::min({length_s, length_s * factor, std::max(kMaxGrowth * at.trial_s, Resolution(at))});
   switched_.ArgumentErrors(row, at.end_s, end_, relative_tolerance_, scale_.weights(), tolerance_);
   if (at.trial_s <= Resolution(at) / 16) return Switch(row);
   at.locating = true;
@@ -93,14 +93,14 @@ bool SwitchingIntegrator::LeaveAtEdge(Eigen::Index row) {
 // Improves the length of the step to the switching, or accepts it.
 void SwitchingIntegrator::JudgeLocating(Eigen::Index row) {
   RowProgress& at = row_of(row);
-  constexpr int kMostSecants = 8;
+  constexpr int kMaxSecants = 8;
   const double value = looks_.OutsideAtEnd(row, at.which, at.upwards);
   constexpr double kPartOfTolerance = 1e-4;
   const double tolerance =
       switched_.modes().sliding(row, at.which) ? relative_tolerance_ : tolerance_(row, at.which);
   if (at.secants > 0) at.slope = (value - at.before_value) / (at.trial_s - at.before_s);
   const double improved_s = at.trial_s - value / at.slope;
-  const bool better = std::abs(value) > kPartOfTolerance * tolerance && at.secants < kMostSecants &&
+  const bool better = std::abs(value) > kPartOfTolerance * tolerance && at.secants < kMaxSecants &&
                       improved_s > 0 && improved_s <= at.full_s &&
                       std::abs(improved_s - at.trial_s) > Resolution(at) / 16;
   if (better) {
@@ -138,12 +138,12 @@ void SwitchingIntegrator::Accept(Eigen::Index row, double length_s, bool hits_st
 // Lets the row go on beyond the switching at the end of its last step.
 void SwitchingIntegrator::Switch(Eigen::Index row) {
   RowProgress& at = row_of(row);
-  constexpr int kMostSwitchings = 10'000;
-  const int most_stalled = 20 + 4 * static_cast<int>(switched_.switches());
+  constexpr int kMaxSwitchings = 10'000;
+  const int max_stalled = 20 + 4 * static_cast<int>(switched_.switches());
   at.stalled = at.end_s - at.switched_s <= Resolution(at) ? at.stalled + 1 : 0;
   at.switched_s = at.end_s;
-  if (at.stalled > most_stalled) return Fail(row, kEndless);
-  if (++at.switchings > kMostSwitchings) return Fail(row, kTooManySwitchings);
+  if (at.stalled > max_stalled) return Fail(row, kEndless);
+  if (++at.switchings > kMaxSwitchings) return Fail(row, kTooManySwitchings);
   switched_.ArgumentErrors(row, at.end_s, end_, relative_tolerance_, scale_.weights(), tolerance_);
   if (!switched_.Leave(row, at.end_s, end_, at.which, at.upwards, tolerance_)) {
     return Fail(row, kContradiction);

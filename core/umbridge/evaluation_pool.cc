@@ -13,8 +13,8 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr int kMostLosses = 10;
-constexpr int kMostBadAnswers = 3;
+constexpr int kMaxLosses = 10;
+constexpr int kMaxBadAnswers = 3;
 constexpr auto kLongestRest = 5s;
 // Interval between two looks at the stop request and at slow points.
 constexpr auto kLook = 20ms;
@@ -176,12 +176,12 @@ void EvaluationPool::Finish(Server& server, const Task& task, const HttpReply& r
       SetResult(job, point,
                 outputs.ok() ? Evaluation{*std::move(outputs), ""}
                              : Evaluation{{}, std::string(outputs.status().message())});
-    } else if (++point.bad_answers >= kMostBadAnswers) {
+    } else if (++point.bad_answers >= kMaxBadAnswers) {
       SetResult(job, point, {{}, std::string(outputs.status().message())});
     }
-  } else if (reply.kind == HttpReply::Kind::kTimedOut && ++point.bad_answers >= kMostBadAnswers) {
+  } else if (reply.kind == HttpReply::Kind::kTimedOut && ++point.bad_answers >= kMaxBadAnswers) {
     SetResult(job, point, {{}, reply.text});
-  } else if (reply.kind == HttpReply::Kind::kLost && ++point.losses >= kMostLosses) {
+  } else if (reply.kind == HttpReply::Kind::kLost && ++point.losses >= kMaxLosses) {
     SetResult(
         job, point,
         {{}, absl::StrFormat("%d connections were lost while it was computed", point.losses)});

@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kLinesBetweenKnots = 10;
 constexpr double kLinesInPeriod = 200;
-constexpr double kMostLines = 1e6;
+constexpr double kMaxLines = 1e6;
 constexpr double kLonger = 0.01;  // of a piece's last line
 
 bool IsSmooth(Interpolation interpolation) {
@@ -61,9 +61,9 @@ absl::StatusOr<InputLines> LinesOf(const InputSignal& signal, double delay_s, do
     const double knot_s = signal.NextKnot(begin_s);
     const double to_s = std::min(knot_s, last_s);
     const double line_s = LongestLine(signal.specification(), begin_s, knot_s);
-    if (static_cast<double>(lines.times_s.size()) + (to_s - begin_s) / line_s > kMostLines) {
+    if (static_cast<double>(lines.times_s.size()) + (to_s - begin_s) / line_s > kMaxLines) {
       return absl::FailedPreconditionError(absl::StrFormat(
-          "more than %g lines would have to stand for it up to t = %g s", kMostLines, end_s));
+          "more than %g lines would have to stand for it up to t = %g s", kMaxLines, end_s));
     }
     // The last line of a piece may be a bit longer, so that rounding leaves no tiny one.
     for (int i = 1; begin_s + (i + kLonger) * line_s < to_s; ++i) add(begin_s + i * line_s);

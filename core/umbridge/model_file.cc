@@ -196,6 +196,8 @@ absl::StatusOr<UmBridgeDescription> ParseUmBridgeDescription(const std::string& 
   read.model.equations =
       absl::StrFormat("computed by the model %s of UM-Bridge servers", read.remote_name);
   read.model.source = absl::StrJoin(read.servers.urls, ", ");
+  // Another server may compute the same model.
+  read.model.identity = Json({read.config, read.input_sizes, read.time_s}).dump();
   return read;
 }
 

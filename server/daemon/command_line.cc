@@ -44,8 +44,7 @@ void AddLimit(CLI::App& app, const std::string& name, int64_t& limit, const std:
       ->capture_default_str();
 }
 
-void AddLimits(CLI::App& app, DaemonOptions& daemon) {
-  SessionLimits& limits = daemon.limits;
+void AddSessionLimits(CLI::App& app, SessionLimits& limits) {
   AddLimit(app, "--max-sessions", limits.sessions, "Sessions of all tenants");
   AddLimit(app, "--max-sessions-per-tenant", limits.sessions_per_tenant, "Sessions of a tenant");
   AddLimit(app, "--max-batch-rows", limits.batch_rows, "Rows of a batch");
@@ -70,6 +69,10 @@ void AddLimits(CLI::App& app, DaemonOptions& daemon) {
   AddLimit(app, "--max-points", problem.points,
            "Collocation points of a problem, of the highest order that its expansion may get",
            kMaxPoints);
+}
+
+void AddLimits(CLI::App& app, DaemonOptions& daemon) {
+  AddSessionLimits(app, daemon.limits);
   app.add_option("--max-memory-mb", daemon.max_memory_mb,
                  "Resident memory in MiB beyond which idle sessions leave the memory and new "
                  "sessions, those that come back, and requests without one are refused; 0: none")
@@ -181,11 +184,13 @@ void AddSecurity(CLI::App& app, DaemonOptions& daemon, bool& insecure, std::stri
                  "PEM file of CAs: clients must have a certificate that one of them signed")
       ->needs(certificate);
   app.add_option("--tokens", daemon.token_file,
-                 "File of the tokens that get in, one a line: NAME TENANT ROLE SHA256; ROLE is "
+                 "File of the accepted tokens, one a line: NAME TENANT ROLE SHA256; ROLE is "
                  "reader, writer, admin or operator");
-  app.add_flag("--behind-edge", daemon.behind_edge,
-               "Believe what callers on loopback say of their clients, in the headers "
-               "x-forwarded-for and x-client-certificate-name: they are the edge. Needs --tokens");
+  app.add_flag(
+      "--behind-edge", daemon.behind_edge,
+      "Believe what callers on loopback say of their clients, in the headers "
+      "x-forwarded-for and x-client-certificate-name: they are the edge. Needs --tokens, or "
+      "--insecure where the edge knows its clients by their certificates");
   app.add_flag("--insecure", insecure, "Listen beyond loopback without TLS and authentication");
   app.add_option("--new-token", new_token,
                  "Make a token for NAME:TENANT:ROLE and end: the secret on stdout, its line for "
@@ -223,13 +228,8 @@ struct Texts {
   bool insecure = false;
 };
 
-void AddService(CLI::App& app, DaemonOptions& daemon, Texts& texts) {
-  app.add_option("--listen", texts.listen,
-                 "HOST:PORT to listen on; port 0 picks a free one; repeat the option, or separate "
-                 "by commas, to listen on several")
-      ->delimiter(',')
-      ->allow_extra_args(false)
-      ->default_str(texts.listen.front());
+// Adds where and how safely sessions are kept.
+void AddJournal(CLI::App& app, DaemonOptions& daemon, Texts& texts) {
   app.add_option("--data-dir", daemon.data_dir,
                  "Folder in which sessions are kept; by default $STATE_DIRECTORY, or "
                  "$XDG_STATE_HOME/polyest, or ~/.local/state/polyest");
@@ -257,6 +257,16 @@ void AddService(CLI::App& app, DaemonOptions& daemon, Texts& texts) {
                  "Largest size of the sessions on disk, MiB; 0: the disk's")
       ->check(CLI::Range(int64_t{0}, int64_t{1} << 40))
       ->capture_default_str();
+}
+
+void AddService(CLI::App& app, DaemonOptions& daemon, Texts& texts) {
+  app.add_option("--listen", texts.listen,
+                 "HOST:PORT to listen on; port 0 picks a free one; repeat the option, or separate "
+                 "by commas, to listen on several")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->default_str(texts.listen.front());
+  AddJournal(app, daemon, texts);
   app.add_option("--fmu-dir", daemon.fmu_dir,
                  "Folder of the FMUs that problems may name; put in it only what you would run");
   app.add_option(

@@ -236,6 +236,17 @@ absl::StatusOr<std::unique_ptr<WebPort>> Daemon::OpenHttp(WebPort::Protocol prot
   return port;
 }
 
+LoggedCaller Daemon::Logged(const grpc::ServerContextBase& call) const {
+  const auto caller = access_->Authorize(call, "GetStatus");
+  LoggedCaller logged{.peer = access_->PeerOf(call)};
+  if (caller.ok()) {
+    logged.tenant = caller->tenant;
+    logged.name = caller->name;
+    logged.role = RoleName(caller->role);
+  }
+  return logged;
+}
+
 absl::Status Daemon::Listen() {
   grpc::EnableDefaultHealthCheckService(true);
   grpc::reflection::InitProtoReflectionServerBuilderPlugin();
@@ -256,16 +267,8 @@ absl::Status Daemon::Listen() {
   builder.SetResourceQuota(
       grpc::ResourceQuota("polyestd").Resize(static_cast<size_t>(BufferBytes())));
   for (const auto& service : services_) builder.RegisterService(service.get());
-  ObserveCalls(builder, metrics_, audit_.get(), [this](const grpc::ServerContextBase& call) {
-    const auto caller = access_->Authorize(call, "GetStatus");
-    LoggedCaller logged{.peer = access_->PeerOf(call)};
-    if (caller.ok()) {
-      logged.tenant = caller->tenant;
-      logged.name = caller->name;
-      logged.role = RoleName(caller->role);
-    }
-    return logged;
-  });
+  ObserveCalls(builder, metrics_, audit_.get(),
+               [this](const grpc::ServerContextBase& call) { return Logged(call); });
   server_ = builder.BuildAndStart();
   if (server_ == nullptr) return absl::InternalError("gRPC's server cannot be started");
   self_check_ = std::make_unique<SelfCheck>(*server_);

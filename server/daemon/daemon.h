@@ -33,6 +33,7 @@
 #include "server/sessions/housekeeper.h"
 #include "server/sessions/session_registry.h"
 #include "server/telemetry/audit_log.h"
+#include "server/telemetry/call_interceptor.h"
 #include "server/telemetry/metrics.h"
 #include "server/telemetry/metrics_endpoint.h"
 #include "server/telemetry/structured_log.h"
@@ -128,6 +129,8 @@ class Daemon {
                                                     std::optional<ListenAddress>& address);
   void ServeWeb();
   absl::Status Listen();
+  // Returns what logs say of a call's caller.
+  LoggedCaller Logged(const grpc::ServerContextBase& call) const;
   int64_t BufferBytes() const;
   absl::Status TellMetrics();
   // Returns what the log says about the daemon once it is ready.

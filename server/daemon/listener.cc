@@ -19,13 +19,16 @@
 #include "core/common/status.h"
 #include "server/daemon/health_dial.h"
 #include "server/telemetry/structured_log.h"
+#include "server/web/listening_socket.h"
 
 namespace polyest::internal {
 namespace {
 
-constexpr int64_t kMostConnections = 10'000;
+constexpr int64_t kMaxConnections = 10'000;
 // Descriptors that connections do not get: for the journal, FMUs, the metrics and all else.
 constexpr int64_t kReserve = 512;
+// Number of ports tried until one is free at all addresses of a name.
+constexpr int kAttempts = 8;
 // Time after which what was sent and not acknowledged ends a connection, ms.
 constexpr int kUserTimeoutMs = 20'000;
 // Pause where the system itself has no descriptors or memory left for a connection.
@@ -95,7 +98,7 @@ int64_t RaiseDescriptorLimit() {
 
 ConnectionLimits LimitConnections(int64_t descriptors, int64_t total, int64_t per_peer) {
   ConnectionLimits limits;
-  limits.total = std::min(total > 0 ? total : kMostConnections,
+  limits.total = std::min(total > 0 ? total : kMaxConnections,
                           std::max<int64_t>(1, descriptors - ReserveOf(descriptors)));
   limits.per_peer = per_peer > 0 ? per_peer : std::max<int64_t>(1, limits.total / 2);
   return limits;
@@ -120,11 +123,11 @@ std::string PeerKey(const sockaddr_storage& address) {
 
 Listener::Socket::~Socket() { close(number); }
 
-void Listener::Bind(const sockaddr* address, socklen_t size, int& port) {
+int Listener::Bind(const sockaddr* address, socklen_t size, int& port) {
   auto socket = std::make_unique<Socket>(
       ::socket(address->sa_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
   const int number = socket->number;
-  if (number < 0) return;
+  if (number < 0) return errno;
   // An older daemon's closed connections do not hold the port; a daemon that listens does.
   SetOption(number, SOL_SOCKET, SO_REUSEADDR, 1);
   if (address->sa_family == AF_INET6) SetOption(number, IPPROTO_IPV6, IPV6_V6ONLY, 0);
@@ -136,12 +139,13 @@ void Listener::Bind(const sockaddr* address, socklen_t size, int& port) {
   SetPort(reinterpret_cast<sockaddr*>(&bound), port);
   if (bind(number, reinterpret_cast<const sockaddr*>(&bound), size) != 0 ||
       listen(number, SOMAXCONN) != 0) {
-    return;
+    return errno;
   }
   socklen_t bound_size = sizeof(bound);
-  if (getsockname(number, reinterpret_cast<sockaddr*>(&bound), &bound_size) != 0) return;
+  if (getsockname(number, reinterpret_cast<sockaddr*>(&bound), &bound_size) != 0) return errno;
   port = PortOf(bound);
   sockets_.push_back(std::move(socket));
+  return 0;
 }
 
 absl::Status Listener::Listen(ListenAddress& address) {
@@ -152,20 +156,37 @@ absl::Status Listener::Listen(ListenAddress& address) {
   hints.ai_family = AF_UNSPEC;
   hints.ai_socktype = SOCK_STREAM;
   hints.ai_flags = AI_PASSIVE;
+  const auto refuse = [&](const std::string& why) {
+    return absl::UnavailableError(
+        absl::StrFormat("--listen: cannot listen on %s: %s", address.ToString(), why));
+  };
   Resolved resolved;
-  if (getaddrinfo(host.c_str(), nullptr, &hints, &resolved.first) != 0) resolved.first = nullptr;
+  const int unknown = getaddrinfo(host.c_str(), nullptr, &hints, &resolved.first);
+  if (unknown != 0) return refuse(gai_strerror(unknown));
   int port = address.port;
-  const size_t before = sockets_.size();
-  for (const addrinfo* one = resolved.first; one != nullptr; one = one->ai_next) {
-    Bind(one->ai_addr, one->ai_addrlen, port);
+  int error = BindAll(resolved.first, port);
+  // A port that is free at the first address may be in use at the second.
+  for (int attempt = 1; error == EADDRINUSE && address.port == 0 && attempt < kAttempts;
+       ++attempt) {
+    error = BindAll(resolved.first, port = 0);
   }
-  if (sockets_.size() == before) {
-    return absl::UnavailableError(absl::StrFormat(
-        "cannot listen on %s: the port is in use or the address is not this machine's",
-        address.ToString()));
-  }
+  if (error != 0) return refuse(WhyNotListening(error));
   address.port = port;
   return absl::OkStatus();
+}
+
+int Listener::BindAll(const addrinfo* addresses, int& port) {
+  const size_t before = sockets_.size();
+  int last = 0;
+  for (const addrinfo* one = addresses; one != nullptr; one = one->ai_next) {
+    last = Bind(one->ai_addr, one->ai_addrlen, port);
+    // A machine may lack one of two kinds of addresses; another program must not have one of them.
+    if (last != 0 && last != EADDRNOTAVAIL && last != EAFNOSUPPORT) {
+      sockets_.resize(before);
+      return last;
+    }
+  }
+  return sockets_.size() > before ? 0 : last;
 }
 
 void Listener::Serve(grpc::ServerBuilder& builder,

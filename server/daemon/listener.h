@@ -6,6 +6,7 @@
 
 #include <absl/status/statusor.h>
 #include <grpcpp/server_builder.h>
+#include <netdb.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
 
@@ -53,8 +54,8 @@ class Listener {
   Listener(const Listener&) = delete;
   Listener& operator=(const Listener&) = delete;
 
-  // Listens on an address, on all that its name stands for, and sets its port if that is 0.
-  // UNAVAILABLE, naming the address, when that is not possible.
+  // Listens on an address, on all that its name stands for and this machine has, and sets its port
+  // if that is 0. UNAVAILABLE, naming the address, when that is not possible.
   absl::Status Listen(ListenAddress& address);
   // Lets the server that is being built take the connections.
   void Serve(grpc::ServerBuilder& builder,
@@ -84,8 +85,11 @@ class Listener {
     const int number;
   };
 
-  // Listens on one address, if that is possible, and sets `port` to the one that it got.
-  void Bind(const sockaddr* address, socklen_t size, int& port);
+  // Listens on one address and sets `port` to the one that it got; returns 0, or the system's
+  // error.
+  int Bind(const sockaddr* address, socklen_t size, int& port);
+  // Does so on all of these addresses that the machine has, or on none.
+  int BindAll(const addrinfo* addresses, int& port);
   void Run(std::stop_token stop);
   void Accept(int socket);
   bool TakeOwn(int connection, const std::string& from);

@@ -16,7 +16,7 @@
 namespace polyest::internal {
 namespace {
 
-// The same length stands in the statements below.
+// The statements below contain this length, too.
 constexpr std::chrono::seconds kLease{3};
 constexpr std::chrono::seconds kBeat{1};
 // Pause between two pieces of what deleted sessions have left.

@@ -30,13 +30,13 @@ constexpr int kLongLog = 100'000;
 
 // Removes some batches of a session. Returns false when it has none left.
 absl::StatusOr<bool> RemoveSomeBatches(SqliteDatabase& database, int64_t session,
-                                       int64_t most_bytes) {
+                                       int64_t max_bytes) {
   std::vector<int64_t> batches;
   {
     SqliteQuery query(database,
                       "SELECT rowid, length(measurements) FROM batch WHERE session = ? LIMIT ?");
     query.Bind(session).Bind(kRemovedBatches);
-    POLYEST_ASSIGN_OR_RETURN(batches, FirstRows(query, most_bytes));
+    POLYEST_ASSIGN_OR_RETURN(batches, FirstRows(query, max_bytes));
   }
   return RunForRows(database, "DELETE FROM batch WHERE rowid = ?", batches);
 }
@@ -128,10 +128,10 @@ absl::StatusOr<bool> SqliteJournal::RemoveSomeDeleted() {
     if (!row) return false;
     session = query.Integer(0);
   }
-  const int64_t most_bytes = std::min(kRemovedBytes, reserve_->bytes() / kRemovalShare);
+  const int64_t max_bytes = std::min(kRemovedBytes, reserve_->bytes() / kRemovalShare);
   const auto remove = [=](SqliteDatabase& database) -> absl::Status {
     for (const auto remove_some : {RemoveSomeBatches, RemoveSomeParts}) {
-      POLYEST_ASSIGN_OR_RETURN(const bool removed, remove_some(database, session, most_bytes));
+      POLYEST_ASSIGN_OR_RETURN(const bool removed, remove_some(database, session, max_bytes));
       if (removed) return absl::OkStatus();
     }
     POLYEST_RETURN_IF_ERROR(

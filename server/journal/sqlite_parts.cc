@@ -40,13 +40,12 @@ absl::StatusOr<std::string> JoinParts(SqliteDatabase& database, int64_t session,
   }
 }
 
-absl::StatusOr<bool> RemoveSomeParts(SqliteDatabase& database, int64_t session,
-                                     int64_t most_bytes) {
+absl::StatusOr<bool> RemoveSomeParts(SqliteDatabase& database, int64_t session, int64_t max_bytes) {
   std::vector<int64_t> rows;
   {
     SqliteQuery query(database, "SELECT rowid, length(bytes) FROM part WHERE session = ?");
     query.Bind(session);
-    POLYEST_ASSIGN_OR_RETURN(rows, FirstRows(query, most_bytes));
+    POLYEST_ASSIGN_OR_RETURN(rows, FirstRows(query, max_bytes));
   }
   return RunForRows(database, kRemovePart, rows);
 }

@@ -19,7 +19,7 @@ absl::Status InsertPart(SqliteDatabase& database, const JournalEntry& entry, con
 absl::StatusOr<std::string> JoinParts(SqliteDatabase& database, int64_t session, int64_t sequence,
                                       int64_t part_count, std::string last);
 // Removes parts of a session, of about so many bytes. Returns false when it has none left.
-absl::StatusOr<bool> RemoveSomeParts(SqliteDatabase& database, int64_t session, int64_t most_bytes);
+absl::StatusOr<bool> RemoveSomeParts(SqliteDatabase& database, int64_t session, int64_t max_bytes);
 // Removes the parts of a batch that was refused.
 absl::Status RemoveRefused(SqliteDatabase& database, const JournalEntry& entry);
 // Removes parts without the row of a batch, in several commits.

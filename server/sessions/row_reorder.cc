@@ -98,12 +98,12 @@ absl::StatusOr<RowReorder::Step> RowReorder::Next(const Samples& batch) const {
   step.run_ended = step.run_ended || batch.end_of_run;
   Release(step);
   const auto rows = std::ssize(held_) - step.released_of_held + std::ssize(step.added);
-  if (rows > kMostHeldRows) {
+  if (rows > kMaxHeldRows) {
     return LimitExceeded(
         "reorderWindowS",
         absl::StrFormat("measurements.timeS: %d rows within reorderWindowS = %g s of the newest "
                         "one are more than the session can hold back, %d; choose a smaller window",
-                        rows, window_s_, kMostHeldRows));
+                        rows, window_s_, kMaxHeldRows));
   }
   return step;
 }
@@ -136,10 +136,11 @@ absl::Status RowReorder::AddRow(const Samples& batch, size_t row, const std::vec
 absl::Status RowReorder::CheckPlace(const Samples& batch, size_t row, const SampleRow& place,
                                     const Step& step) const {
   if (step.any ? place.run < step.newest.run : place.run != 0) {
+    const std::string before = step.any ? absl::StrFormat(" after %d", step.newest.run) : "";
     return RefusedRow(
         "run", row,
-        absl::StrFormat("row %d, column run: %d after %d; runs start at 0 and never decrease", row,
-                        place.run, step.newest.run));
+        absl::StrFormat("row %d, column run: %d%s; runs start at 0 and never decrease", row,
+                        place.run, before));
   }
   if (!step.any || place.run > step.newest.run) return absl::OkStatus();
   if (step.run_ended) {

@@ -43,7 +43,7 @@ class RowReorder {
 
  public:
   // The largest number of rows held back; some 10 MB of memory.
-  static constexpr int64_t kMostHeldRows = 100'000;
+  static constexpr int64_t kMaxHeldRows = 100'000;
 
   // Where in a sequence of batches the same rows are to be released once more.
   struct Resumption {
@@ -78,7 +78,7 @@ class RowReorder {
   // Takes rows in any order; the columns' names, the values and the times have been checked.
   // Refuses the whole batch with INVALID_ARGUMENT, naming row, columns and times, if a row is older
   // than the newest one of its run by more than the window, if its run has ended, or if its channel
-  // has another sample at the same time; with RESOURCE_EXHAUSTED past kMostHeldRows.
+  // has another sample at the same time; with RESOURCE_EXHAUSTED past kMaxHeldRows.
   absl::StatusOr<Step> Next(const Samples& batch) const;
   // Goes on to the state after the step; needs no memory.
   void Accept(Step step);

@@ -12,6 +12,7 @@
 
 #include <cerrno>
 #include <cstdint>
+#include <cstring>
 
 #include "core/common/check.h"
 
@@ -26,7 +27,7 @@ constexpr int kUserTimeoutMs = 30'000;
 // Time until the next try when there are no descriptors or no memory.
 constexpr int kPauseMs = 50;
 
-// Listens on an address; −1 if that fails.
+// Listens on an address; −1 if that fails, with the reason in errno.
 int Listen(const addrinfo& address) {
   const int descriptor =
       socket(address.ai_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, IPPROTO_TCP);
@@ -42,7 +43,9 @@ int Listen(const addrinfo& address) {
       listen(descriptor, kBacklog) == 0) {
     return descriptor;
   }
+  const int error = errno;
   close(descriptor);
+  errno = error;
   return -1;
 }
 
@@ -64,7 +67,14 @@ void Prepare(int connection) {
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<ListeningSocket>> ListeningSocket::Open(const std::string& host,
+std::string WhyNotListening(int error) {
+  if (error == EADDRINUSE) return "the port is in use";
+  if (error == EADDRNOTAVAIL) return "the address is not this machine's";
+  return std::strerror(error);
+}
+
+absl::StatusOr<std::unique_ptr<ListeningSocket>> ListeningSocket::Open(const char* option,
+                                                                       const std::string& host,
                                                                        int port) {
   const bool bracketed = host.starts_with('[') && host.ends_with(']');
   const std::string name = bracketed ? host.substr(1, host.size() - 2) : host;
@@ -74,16 +84,20 @@ absl::StatusOr<std::unique_ptr<ListeningSocket>> ListeningSocket::Open(const std
   hints.ai_flags = AI_PASSIVE | AI_NUMERICSERV;
   addrinfo* addresses = nullptr;
   int descriptor = -1;
-  if (getaddrinfo(name.c_str(), absl::StrCat(port).c_str(), &hints, &addresses) == 0) {
+  std::string why;
+  const int unknown = getaddrinfo(name.c_str(), absl::StrCat(port).c_str(), &hints, &addresses);
+  if (unknown != 0) {
+    why = gai_strerror(unknown);
+  } else {
     for (const addrinfo* one = addresses; one != nullptr && descriptor < 0; one = one->ai_next) {
       descriptor = Listen(*one);
+      if (descriptor < 0) why = WhyNotListening(errno);
     }
     freeaddrinfo(addresses);
   }
   if (descriptor < 0) {
-    return absl::UnavailableError(absl::StrFormat(
-        "--web: cannot listen on %s:%d: the port is in use or the address is not this machine's",
-        host, port));
+    return absl::UnavailableError(
+        absl::StrFormat("%s: cannot listen on %s:%d: %s", option, host, port, why));
   }
   const int stop = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
   POLYEST_CHECK(stop >= 0);

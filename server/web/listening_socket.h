@@ -9,11 +9,15 @@
 
 namespace polyest::internal {
 
+// Returns in words why an address cannot be listened on, given the error of the system call.
+std::string WhyNotListening(int error);
+
 class ListeningSocket {
  public:
   // Binds the port and listens. `host` is a name, an IPv4 address, or an IPv6 address in brackets;
-  // port 0 picks a free one. UNAVAILABLE when that is not possible, naming the option --web.
-  static absl::StatusOr<std::unique_ptr<ListeningSocket>> Open(const std::string& host, int port);
+  // port 0 picks a free one. UNAVAILABLE when that is not possible, naming the `option`.
+  static absl::StatusOr<std::unique_ptr<ListeningSocket>> Open(const char* option,
+                                                               const std::string& host, int port);
   ~ListeningSocket();
   ListeningSocket(const ListeningSocket&) = delete;
   ListeningSocket& operator=(const ListeningSocket&) = delete;

@@ -40,7 +40,7 @@ HttpAnswer ErrorAnswer(const rpc::Status& status) {
   const auto code = static_cast<grpc::StatusCode>(status.code());
   HttpAnswer answer{.status = HttpStatus(code), .content_type = "application/json"};
   auto json = TryToJson(status, /*several_lines=*/false);
-  // Of an error that has no form in JSON, the code is left.
+  // Keeps only the code of an error that has no form in JSON.
   if (!json.ok()) return ErrorAnswer(answer.status, code, "the error has no form in JSON");
   answer.body = *std::move(json);
   if (code == grpc::StatusCode::UNAUTHENTICATED) {

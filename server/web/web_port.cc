@@ -12,7 +12,10 @@ namespace polyest::internal {
 
 absl::StatusOr<std::unique_ptr<WebPort>> WebPort::Open(const Options& options) {
   WebServer::Options server{
-      .host = options.host, .port = options.port, .body_memory_bytes = options.body_memory_bytes};
+      .option = options.protocol == Protocol::kUmBridge ? "--umbridge" : "--web",
+      .host = options.host,
+      .port = options.port,
+      .body_memory_bytes = options.body_memory_bytes};
   server.http.body_bytes = static_cast<size_t>(options.max_message_mb) << 20;
   POLYEST_ASSIGN_OR_RETURN(auto opened, WebServer::Open(server));
   std::unique_ptr<WebPort> port(new WebPort(options, std::move(opened)));

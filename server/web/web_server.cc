@@ -32,7 +32,8 @@ void RefuseConnection(int descriptor) {
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<WebServer>> WebServer::Open(const Options& options) {
-  POLYEST_ASSIGN_OR_RETURN(auto socket, ListeningSocket::Open(options.host, options.port));
+  POLYEST_ASSIGN_OR_RETURN(auto socket,
+                           ListeningSocket::Open(options.option, options.host, options.port));
   return std::unique_ptr<WebServer>(new WebServer(options, std::move(socket)));
 }
 

@@ -25,6 +25,7 @@ namespace polyest::internal {
 class WebServer {
  public:
   struct Options {
+    const char* option = "--web";  // that asks for the server, for errors
     std::string host;
     int port = 0;  // 0: any free one
     HttpLimits http{};

@@ -39,7 +39,7 @@ using Stub = v1::SessionService::Stub;
 
 constexpr int kRows = 100;
 constexpr int kBatchesASecond = 10;
-constexpr std::chrono::seconds kMostToConnect{10};
+constexpr std::chrono::seconds kMaxToConnect{10};
 constexpr double kStiffness = 40, kDamping = 0.4;
 
 constexpr char kFourChannels[] = R"json({
@@ -127,7 +127,7 @@ std::unique_ptr<Stub> Connect(int port) {
   arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
   const auto channel = grpc::CreateCustomChannel("127.0.0.1:" + std::to_string(port),
                                                  grpc::InsecureChannelCredentials(), arguments);
-  POLYEST_CHECK(channel->WaitForConnected(std::chrono::system_clock::now() + kMostToConnect));
+  POLYEST_CHECK(channel->WaitForConnected(std::chrono::system_clock::now() + kMaxToConnect));
   return v1::SessionService::NewStub(channel);
 }
 

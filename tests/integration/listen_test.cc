@@ -50,6 +50,23 @@ TEST(Listening, NamesTheAddressThatCannotBeHad) {
   EXPECT_THAT(second.Errors(), HasSubstr("cannot listen on " + taken + ": the port is in use"));
 }
 
+TEST(Listening, NamesAHostThatIsUnknown) {
+  DaemonProcess daemon({"--listen", "nosuchhost.invalid:5000"});
+  EXPECT_EQ(daemon.Wait(), 1);
+  EXPECT_THAT(daemon.Errors(),
+              testing::MatchesRegex(
+                  "polyestd: --listen: cannot listen on nosuchhost.invalid:5000: .*[Nn]ame.*\n"));
+}
+
+TEST(Listening, NamesTheOptionOfUmBridge) {
+  DaemonProcess first({"--listen", "127.0.0.1:0"});
+  const std::string taken = first.ReadAddress();
+  DaemonProcess second({"--listen", "127.0.0.1:0", "--umbridge", taken});
+  EXPECT_EQ(second.Wait(), 1);
+  EXPECT_THAT(second.Errors(),
+              HasSubstr("--umbridge: cannot listen on " + taken + ": the port is in use"));
+}
+
 TEST(Listening, IsNowhereWhenOneAddressOfThemIsTooExposed) {
   DaemonProcess daemon({"--listen", "127.0.0.1:0", "--listen", "0.0.0.0:0"});
   EXPECT_EQ(daemon.Wait(), 2);

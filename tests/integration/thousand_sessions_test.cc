@@ -139,7 +139,7 @@ constexpr bool kSanitized = POLYEST_ADDRESS_SANITIZER || POLYEST_THREAD_SANITIZE
 // below it. A sanitizer's own memory grows with the memory that was freed, but it finds what a
 // hundred sessions have left, and races between them, as well as of a thousand.
 TEST_F(ThousandSessionsTest, LeaveNothingBehind) {
-  constexpr int kMostTries = 4;
+  constexpr int kMaxTries = 4;
   if (kSanitized) {
     LiveThrough();
     daemon_->Stop();
@@ -155,7 +155,7 @@ TEST_F(ThousandSessionsTest, LeaveNothingBehind) {
   };
   Memory half = live_through_half();
   Memory full = live_through_half();
-  for (int tries = 0; above_limit(full, half) && tries < kMostTries; ++tries) {
+  for (int tries = 0; above_limit(full, half) && tries < kMaxTries; ++tries) {
     half = full;
     full = live_through_half();
   }

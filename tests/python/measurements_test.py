@@ -159,8 +159,14 @@ def test_columns_of_the_condition_are_sent():
 def test_runs_are_whole_numbers():
     found = converter().convert({"t": [0.0, 0.0], "run": [0, 1], "x": [1.0, 2.0]})
     assert list(found.run) == [0, 1]
-    with pytest.raises(polyest.InvalidInput, match="run: a run must be a whole number"):
-        converter().convert({"t": [0.0], "run": [0.5], "x": [1.0]})
+    for run in (0.5, -1, 3e9, float("nan")):
+        with pytest.raises(polyest.InvalidInput, match="run: row 1: .* must be a whole number from"):
+            converter().convert({"t": [0.0, 0.1], "run": [0, run], "x": [1.0, 1.0]})
+
+
+def test_columns_of_lists_are_refused():
+    with pytest.raises(polyest.InvalidInput, match="x: is no column of numbers"):
+        converter().convert({"t": [0.0, 0.1], "x": [[1.0], [1.0, 2.0]]})
 
 
 @pytest.mark.parametrize(("unit", "factor"), [("ms", 1e-3), ("min", 60.0), ("s", 1.0)])

@@ -1,6 +1,7 @@
 """The builder of problems: the same file as by hand, the daemon's own checks."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -23,11 +24,6 @@ def test_every_example_is_read_and_saved_without_a_change(file, tmp_path):
 
 def test_everything_that_a_problem_may_say(client):
     problem = (
-        polyest.Problem.equations(
-            states={"x": "v", "v": "(f(t) + u - k*x - c*v)/m"}, outputs={"x": "x", "v": "v"},
-            parameters={"m": 1.0}, inputs=["u"], units={"k": "N/m", "x": "m"},
-            intermediates={"f(t)": "0"})
-        if False else
         polyest.Problem.equations(
             states={"x": "v", "v": "(u - force)/m"}, outputs={"x": "x", "v": "v"},
             parameters={"m": 1.0}, inputs=["u"], intermediates={"force": "k*x + c*v"}))
@@ -70,8 +66,31 @@ def test_process_noise_and_drift_are_written_as_in_the_examples():
     assert warming == polyest.Problem.read(EXAMPLES / "warming.json")
     limited = polyest.Problem({}).expand(max_replay_row_count=20000)
     assert limited.as_dict() == {"expansion": {"maxReplayRowCount": 20000}}
+    specimens = (
+        polyest.Problem.builtin("mass_spring_damper").fix(m=1, x0=1, c=0.23)
+        .uncertain("k", polyest.Normal(40, 4), per_run=True, population=True).measure("x", 0.05))
+    assert specimens == polyest.Problem.read(EXAMPLES / "specimens.json")
     known = polyest.Problem({}).uncertain("c", polyest.Normal(1, 0.4), drift=0.05)
     assert known.as_dict()["uncertain"][0]["drift"] == {"randomWalk": {"stdDevPerSqrtS": 0.05}}
+    table = polyest.Problem.equations(states={"x": "-f(x)"}, outputs={"x": "x"},
+                                      tables={"f": ([0, 1, 3], [0, 2, 3])})
+    assert table.as_dict()["model"]["equations"]["tables"] == {
+        "f": {"x": [0, 1, 3], "value": [0, 2, 3]}}
+    streamed = polyest.Problem({}).stream("u", interpolation="LINEAR").as_dict()["inputs"]
+    assert streamed == [{"name": "u", "streamed": {"interpolation": "LINEAR"}}]
+
+
+@pytest.mark.parametrize(("document", "field", "rule"), [
+    ({"fixed": {"v0": "a"}}, "fixed", "could not convert|Couldn't parse"),
+    ({"uncertian": []}, "uncertian", "is not a field"),
+    ({"measured": [{"output": "x", "nose": 1}]}, r"measured\[0\].nose", "is not a field"),
+    ({"expansion": {"points": "MANY"}}, "expansion.points", "Invalid enum value MANY"),
+])
+def test_a_value_of_the_wrong_form_is_refused_with_field_and_rule(document, field, rule):
+    with pytest.raises(polyest.InvalidInput) as raised:
+        to_message(document)
+    assert re.match(field, raised.value.field), raised.value.field
+    assert re.search(rule, raised.value.rule), raised.value.rule
 
 
 @pytest.mark.parametrize("signal", [

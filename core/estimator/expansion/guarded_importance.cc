@@ -15,7 +15,7 @@ namespace {
 
 constexpr int kStarts = 6;
 // Points of the cover: so many for each parameter, and at most.
-constexpr int kCoverPerParameter = 1024, kMostCover = 4096;
+constexpr int kCoverPerParameter = 1024, kMaxCover = 4096;
 // Number of points of the cover, and of the guesses, from which starts are taken.
 constexpr Eigen::Index kBest = 256;
 // Another minimum, or a distant point, matters when its cost exceeds the least one by less than the
@@ -44,7 +44,7 @@ class GuardedImportance {
  private:
   // Computes the costs of the cover and the guesses, and the minima found from the best of them.
   void Look() {
-    const int count = std::min(kMostCover, kCoverPerParameter * cost_.dimension());
+    const int count = std::min(kMaxCover, kCoverPerParameter * cost_.dimension());
     const Matrix cover =
         CoverOfDomain(cost_.region(), cost_.prior(), lower_, upper_, guesses_, count);
     known_.etas.resize(count + guesses_.rows(), cost_.dimension());

@@ -10,7 +10,7 @@ namespace polyest::internal {
 namespace {
 
 constexpr double kMaxShift = 0.5;  // in standard deviations
-constexpr double kMostSpread = 1;  // of β (J_m − J)
+constexpr double kMaxSpread = 1;   // of β (J_m − J)
 constexpr double kStep = 0.8;      // from one trial of β to the next
 constexpr double kLeastPower = 1e-12;
 // In more dimensions the collocation points are too few to confirm any posterior that is much
@@ -53,7 +53,7 @@ bool Confirmed(const Points& points, double beta, double inflation, double effec
   if (sum * sum < effective * weights.square().sum()) return false;
   const double mean = (weights * points.difference).sum() / sum;
   const double variance = (weights * (points.difference - mean).square()).sum() / sum;
-  return beta * inflation * std::sqrt(variance) <= kMostSpread;
+  return beta * inflation * std::sqrt(variance) <= kMaxSpread;
 }
 
 }  // namespace

@@ -8,7 +8,8 @@ namespace polyest::internal {
 namespace {
 
 constexpr double kMinEffectiveChecks = 2;  // for the spread over them to be meaningful
-constexpr double kMaxSpread = 0.25;  // standard deviation of ΔJ at which its mean counts as known
+constexpr double kMaxSpreadOfMean =
+    0.25;  // standard deviation of ΔJ at which its mean counts as known
 constexpr double kNegligibleWeight = 1e-3;  // weight of a check point relative to the heaviest
 
 }  // namespace
@@ -78,7 +79,7 @@ Agreement AgreementWithModel(const RegionalExpansion& expansion, const Cost& cos
   if (1 >= kMinEffectiveChecks * weights.squaredNorm()) {
     const double carried = std::sqrt(cost.power() * expansion.CarriedError());
     agreement.shift = std::min(agreement.shift, spread + carried);
-    if (spread <= kMaxSpread) agreement.mean_difference = mean;
+    if (spread <= kMaxSpreadOfMean) agreement.mean_difference = mean;
   }
   return agreement;
 }

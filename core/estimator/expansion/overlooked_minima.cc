@@ -19,11 +19,11 @@
 namespace polyest::internal {
 namespace {
 
-constexpr int kMostStarts = 12;  // of collocation points, and of guesses
-constexpr int kMostRuns = 6;     // of the model, at the lowest minima outside
+constexpr int kMaxStarts = 12;  // of collocation points, and of guesses
+constexpr int kMaxRuns = 6;     // of the model, at the lowest minima outside
 // How far the model's cost at such a minimum may be above its cost at the lowest one. The minimum
 // of an inaccurate expansion lies beside the model's, so that more than its weight is allowed for.
-constexpr double kMostAbove = 12;
+constexpr double kMaxAbove = 12;
 
 // Returns the model's cost at a point (local coordinates) from its χ² of each channel.
 double ModelCost(const RegionalExpansion& expansion, const Cost& cost, const Vector& eta,
@@ -33,13 +33,13 @@ double ModelCost(const RegionalExpansion& expansion, const Cost& cost, const Vec
   return cost.power() * model + cost.regularization() * prior;
 }
 
-// Returns the rows of `points` with the least of the costs, kMostStarts at most.
+// Returns the rows of `points` with the least of the costs, kMaxStarts at most.
 Matrix Least(const Matrix& points, const Vector& costs) {
   std::vector<Eigen::Index> order(static_cast<size_t>(points.rows()));
   std::iota(order.begin(), order.end(), 0);
   std::ranges::stable_sort(order,
                            [&](Eigen::Index a, Eigen::Index b) { return costs[a] < costs[b]; });
-  order.resize(std::min<size_t>(kMostStarts, order.size()));
+  order.resize(std::min<size_t>(kMaxStarts, order.size()));
   return points(order, Eigen::all);
 }
 
@@ -90,7 +90,7 @@ Matrix LowestAndOutside(const RegionalExpansion& expansion, const Cost& cost,
     if (!minimum.converged || local.cwiseAbs().maxCoeff() <= 1) continue;
     found.conservativeResize(found.rows() + 1, Eigen::NoChange);
     found.bottomRows(1) = minimum.point.transpose();
-    if (found.rows() > kMostRuns) break;
+    if (found.rows() > kMaxRuns) break;
   }
   return found;
 }
@@ -157,7 +157,7 @@ absl::StatusOr<ConfirmedMinima> OverlookedMinima(const RegionalExpansion& expans
                            CostsAt(expansion, cost, etas, particles, request, stop, confirmed));
   if (costs.empty()) return confirmed;
   std::vector<Eigen::Index> rows;
-  const double limit = *std::min_element(costs.begin(), costs.end()) + kMostAbove;
+  const double limit = *std::min_element(costs.begin(), costs.end()) + kMaxAbove;
   for (size_t i = 0; i < costs.size(); ++i) {
     const auto row = static_cast<Eigen::Index>(i);
     if (i > 0 && !(costs[i] < kInfinity && costs[i] <= limit)) continue;

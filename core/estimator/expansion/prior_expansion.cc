@@ -1,5 +1,6 @@
 #include "core/estimator/expansion/prior_expansion.h"
 
+#include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 #include <absl/strings/str_join.h>
 
@@ -21,6 +22,8 @@ namespace {
 // Number of columns (output × time) processed at once. It bounds the memory and the time between
 // two checks of the stop request.
 constexpr int64_t kColumnsAtATime = 128;
+// As many times of a grid as this are not counted any more.
+constexpr int64_t kMaxCounted = int64_t{1} << 50;
 
 absl::Status CheckNoStreamedInput(const ResolvedProblem& problem) {
   if (problem.streamed_inputs().empty()) return absl::OkStatus();
@@ -68,7 +71,7 @@ absl::Status TimeGrid::Validate() const {
 
 int64_t TimeGrid::count() const {
   const double steps = std::floor(until_s / step_s * (1 + 1e-12));
-  return steps < 1e15 ? static_cast<int64_t>(steps) + 1 : int64_t{1} << 50;
+  return steps < static_cast<double>(kMaxCounted) ? static_cast<int64_t>(steps) + 1 : kMaxCounted;
 }
 
 double TimeGrid::time_s(int64_t k) const {
@@ -86,9 +89,10 @@ absl::Status CheckAnswerSize(const TimeGrid& grid, size_t outputs, int64_t numbe
   const int64_t values = std::min(times, most + 1) * numbers * static_cast<int64_t>(outputs);
   if (values <= most) return absl::OkStatus();
   return absl::ResourceExhaustedError(absl::StrFormat(
-      "until/step: %d times of %d outputs with %d numbers each are more than the limit of %d "
+      "until/step: %s times of %d outputs with %d numbers each are more than the limit of %d "
       "numbers",
-      times, outputs, numbers, most));
+      times < kMaxCounted ? absl::StrCat(times) : absl::StrCat("more than ", kMaxCounted - 1),
+      outputs, numbers, most));
 }
 
 absl::StatusOr<std::vector<int>> ChooseOutputs(const ResolvedProblem& problem,

@@ -25,7 +25,7 @@ constexpr double kPays = 0.5;  // volume ratio: a move that saves less is not ma
 // posterior.
 constexpr double kMaxErrorOfRaised = 0.05;
 // The error of an order of which no expansion can be made.
-constexpr double kMostError = std::numeric_limits<double>::max();
+constexpr double kMaxError = std::numeric_limits<double>::max();
 // Fraction of the particles that stands for a minimum that the sampler overlooked: enough for a
 // piece of the posterior to be found there.
 constexpr double kShareOfOverlooked = 0.03;
@@ -129,7 +129,7 @@ class Settler {
         result_.postponed = true;
         return absl::OkStatus();
       }
-      const double error = raised ? ErrorOf(*result_.expansion) : kMostError;
+      const double error = raised ? ErrorOf(*result_.expansion) : kMaxError;
       if (error <= kMaxErrorOfRaised) return absl::OkStatus();
       if (tried.order == 0 || error < tried.error) {
         tried = TriedInVain(next->order, error, region, request_.rows, present_.noise());

@@ -26,13 +26,12 @@
 
 #include "core/bayes/mismatch.h"
 #include "core/bayes/relative_noise.h"
-#include "core/bayes/window_sums.h"
 #include "core/chaos/collocation_matrix.h"
 #include "core/chaos/packed_matrix.h"
+#include "core/estimator/expansion/absorbed_rows.h"
 #include "core/estimator/expansion/expansion_design.h"
 #include "core/estimator/record/data_facts.h"
 #include "core/estimator/record/learned_noise.h"
-#include "core/estimator/record/residual_blocks.h"
 #include "core/estimator/record/run_inputs.h"
 #include "core/estimator/record/whitening.h"
 #include "core/propagation/filter_bank.h"
@@ -47,46 +46,6 @@ struct FailedTrajectory {
   double time_s = 0;
   int flag = 0;
   std::string reason;
-};
-
-// The accumulated contributions of the rows that an expansion has absorbed.
-struct AbsorbedRows {
-  // Starts from zero, for S terms, m channels, and Q collocation, C check and K control points.
-  AbsorbedRows(int terms, int channels, Eigen::Index points, Eigen::Index check_points,
-               int controls);
-
-  int64_t rows = 0;
-  int64_t samples = 0;            // over all channels
-  int64_t propagated = 0;         // trajectories × rows
-  std::vector<ChannelSums> sums;  // per channel, over all runs
-  WindowSums windows;             // the sums by windows of the record; none after ended runs
-  Vector discount;                // per channel: Σ ρ_k/R_k, with ρ divided by the misfit
-  double own_error = 0;           // Σ ρ_k/R_k over all channels, with ρ as it is
-  // The part of `own_error` that was taken over from an expansion over another region, and what
-  // each further sample adds to it because of the states taken over (carry_over.h).
-  double carried_error = 0;
-  double carried_rate = 0;
-  double log_noise = 0;     // Σ ½ log σ² + what outliers' weights leave out of the likelihood
-  double log_variance = 0;  // as log_noise, with R in place of σ²
-  std::vector<int64_t> outliers;  // per channel
-  // Each channel's previous sample in units of its noise; zero at the beginning of a run.
-  int summed_run = -1;
-  Matrix previous_coefficients;  // S × m
-  Vector previous_error;
-  std::vector<CorrelationProfile> profiles;  // per channel; empty unless its correlation is learned
-  std::vector<ResidualBlocks> blocks;  // per channel; since sums were carried over, if they were
-  Vector largest;  // per channel: largest |z| of the rows propagated, for relative noise
-  // Sums at the check points.
-  Matrix check_chi_squared;       // C × m
-  Vector check_residual;          // Σ ((model − expansion)/σ)²
-  std::vector<bool> check_valid;  // whether the trajectory could be integrated
-  // χ² of the model itself at the collocation points, Q × m, with the variances R of the sums; not
-  // finite where the trajectory could not be integrated. With filters, Σ log(S/σ²) is included,
-  // here and at the check points.
-  Matrix point_chi_squared;
-  Vector point_log_variance;        // Q: ½ Σ log(S/σ²) with filters, discounted; empty without
-  Matrix control_scores;            // S × (K · m), column i · m + c (control_trajectories.h)
-  std::vector<bool> control_valid;  // whether the trajectory could be integrated; K
 };
 
 struct ExpansionState;
@@ -184,11 +143,12 @@ class RegionalExpansion {
   // Returns the expansions of the filters' states after the rows propagated; nothing without
   // filters or before the first row.
   std::optional<FilteredStates> Filtered() const;
-  // Returns the likelihood of a channel's residuals for other time constants, about LinearizedAt().
-  // Of residuals linearized at LinearizedAt(); without any block where filters predict.
+  // Returns the sums of blocks of a channel's residuals, linearized at LinearizedAt(); without any
+  // block where filters predict.
   const ResidualBlocks& Blocks(int channel) const {
     return absorbed_.blocks[static_cast<size_t>(channel)];
   }
+  // Returns the likelihood of a channel's residuals for other time constants, about LinearizedAt().
   const CorrelationProfile& Profile(int channel) const {
     return absorbed_.profiles[static_cast<size_t>(channel)];
   }

@@ -18,7 +18,7 @@ constexpr double kShortestStep = 1e-9;
 constexpr double kLineReach = 7;  // standard deviations
 constexpr int kLineNodes = 48;
 constexpr int kBoxNodes = 7;  // for each of two or three parameters
-constexpr Eigen::Index kMostInBox = 3;
+constexpr Eigen::Index kMaxInBox = 3;
 
 // Returns the Hessian, raised until it is positive definite.
 Matrix PositiveDefinite(const Matrix& hessian) {
@@ -69,7 +69,7 @@ double RunMarginal::NegativeLogIntegral(const Vector& origin,
                                         const ConditionalMinimum& minimum) const {
   const Eigen::Index own = minimum.own.size();
   if (own == 1) return IntegrateLine(origin, minimum);
-  if (own <= kMostInBox) return IntegrateBox(origin, minimum);
+  if (own <= kMaxInBox) return IntegrateBox(origin, minimum);
   return minimum.value + CholeskyFactor(minimum.hessian).HalfLogDeterminant() -
          0.5 * static_cast<double>(own) * std::log(2 * std::numbers::pi);
 }

@@ -13,7 +13,7 @@ namespace polyest::internal {
 namespace {
 
 // Importance sampling's points: so many for each parameter, and at most.
-constexpr int kPointsPerParameter = 1024, kMostPoints = 4096;
+constexpr int kPointsPerParameter = 1024, kMaxImportancePoints = 4096;
 
 // Resamples systematically, then shuffles: the first particles become check points, and the order
 // of quasi-random points is anything but random.
@@ -34,7 +34,7 @@ absl::StatusOr<Particles> SampleForSettlement(const Cost& cost, const ExpansionD
   SamplerOptions options;
   options.seed = seed;
   const Matrix local = design.region.ManyToLocal(guesses);
-  const int points = std::min(kMostPoints, kPointsPerParameter * cost.dimension());
+  const int points = std::min(kMaxImportancePoints, kPointsPerParameter * cost.dimension());
   const GuardedDraws drawn = DrawIfNearlyGaussian(cost, design, local, points, stop);
   POLYEST_RETURN_IF_ERROR(stop.Check());
   if (drawn.draws) return Resample(*drawn.draws, options.particles, seed);

@@ -20,7 +20,7 @@ namespace {
 // it cannot have created or omitted them: the shift must not exceed this value.
 constexpr double kMaxShiftInPieces = 1;
 // Trajectories that the components may propagate together, and components that they always may be.
-constexpr double kMostTrajectories = 2048;
+constexpr double kMaxTrajectories = 2048;
 constexpr int kPiecesAtLeast = 4;
 // An element is bisected in at most so many dimensions: the number of halves that a posterior
 // touches doubles with each of them.
@@ -44,7 +44,7 @@ int MostComponents(const ResolvedProblem& problem) {
   const int n = problem.dimension();
   const auto terms = TermCount(n, FirstTruncation(options, n), kMaxTerms);
   const double points = options.points_per_term * static_cast<double>(terms);
-  return std::max(kPiecesAtLeast, static_cast<int>(kMostTrajectories / points));
+  return std::max(kPiecesAtLeast, static_cast<int>(kMaxTrajectories / points));
 }
 
 // Pieces are not looked for before the noise is learned, because the noise would decide between

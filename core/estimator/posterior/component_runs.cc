@@ -27,9 +27,9 @@
 namespace polyest::internal {
 namespace {
 
-constexpr double kContraction = 0.7;    // of a standard deviation
-constexpr double kMostMoved = 1;        // standard deviations
-constexpr double kMostRescaled = 1.25;  // factor of the noise's scale
+constexpr double kContraction = 0.7;   // of a standard deviation
+constexpr double kMaxMoved = 1;        // standard deviations
+constexpr double kMaxRescaled = 1.25;  // factor of the noise's scale
 // The Gaussian at the minimum of the cost stands for the posterior where the gradient leaves no
 // more than this to be gained: the minimum is not at a bound.
 constexpr double kMaxGain = 0.01;
@@ -53,7 +53,7 @@ GermSummary Shared(const ResolvedProblem& problem, const GermSummary& all) {
 bool HoldsAbout(const EndedRuns& ended, const GermSummary& shared) {
   const Matrix unit = Inverse(ended.factor);
   const Vector moved = unit * (shared.mean - ended.centre);
-  if (moved.norm() > kMostMoved * std::sqrt(static_cast<double>(moved.size()))) return false;
+  if (moved.norm() > kMaxMoved * std::sqrt(static_cast<double>(moved.size()))) return false;
   const Matrix relative = unit * shared.covariance * unit.transpose();
   return SymmetricEigenvalues(relative).minCoeff() > kContraction * kContraction;
 }
@@ -63,7 +63,7 @@ bool HoldsWith(const EndedRuns& ended, const LearnedNoise& noise) {
     const ChannelNoise& present = noise.channels[c];
     const auto channel = static_cast<Eigen::Index>(c);
     const double ratio = present.scale / ended.noise_scale[channel];
-    if (ratio > kMostRescaled || ratio < 1 / kMostRescaled) return false;
+    if (ratio > kMaxRescaled || ratio < 1 / kMaxRescaled) return false;
     if (present.time_constant_s != ended.noise_time_constant_s[channel] ||
         present.white_share != ended.noise_white_share[channel]) {
       return false;

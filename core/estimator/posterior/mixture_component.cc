@@ -166,7 +166,7 @@ absl::StatusOr<bool> MixtureComponent::AbsorbBlock(const RowBlock& block, const 
     summary_.Add(block, row, problem_.channels());
     AddPredictionsOf(*expansion_, row, summary_);
     ++taken_;
-    contracts_ = too_coarse;
+    last_row_too_coarse_ = too_coarse;
     POLYEST_ASSIGN_OR_RETURN(const bool moved, FinishRow(stop));
     if (moved) return false;
   }
@@ -177,9 +177,9 @@ absl::StatusOr<bool> MixtureComponent::AbsorbBlock(const RowBlock& block, const 
 // true when the expansion has moved or must be divided.
 absl::StatusOr<bool> MixtureComponent::FinishRow(const Stop& stop) {
   bool moved = false;
-  if (contracts_) {
+  if (last_row_too_coarse_) {
     POLYEST_ASSIGN_OR_RETURN(moved, ContractOrBisect(stop));
-    contracts_ = false;
+    last_row_too_coarse_ = false;
   }
   if (must_divide()) return true;
   bool settled = false;

@@ -184,13 +184,13 @@ class MixtureComponent {
   int threads_;
   bool learns_noise_;
   std::unique_ptr<RegionalExpansion> expansion_;
-  bool broken_ = false;        // whether a stop left the expansion between two rows
-  Matrix particles_;           // of the last settlement, germ coordinates
-  SettlementMemory memory_;    // and what they and earlier ones have found
-  std::vector<Piece> pieces_;  // those to divide into; halves are found by Divide
-  bool contracts_ = false;     // whether the last row was too coarse and not dealt with yet
-  bool halves_ = false;        // whether to divide into the halves of a bisection
-  bool bisected_ = false;      // whether it came from a bisection; its order stays low
+  bool broken_ = false;               // whether a stop left the expansion between two rows
+  Matrix particles_;                  // of the last settlement, germ coordinates
+  SettlementMemory memory_;           // and what they and earlier ones have found
+  std::vector<Piece> pieces_;         // those to divide into; halves are found by Divide
+  bool last_row_too_coarse_ = false;  // whether the last row was too coarse and not dealt with yet
+  bool halves_ = false;               // whether to divide into the halves of a bisection
+  bool bisected_ = false;             // whether it came from a bisection; its order stays low
   int room_ = 1;
   double weight_ = 1;
   int64_t taken_ = 0;
@@ -202,9 +202,9 @@ class MixtureComponent {
   int64_t whole_until_ = 0;     // no search for pieces before this row
   TemperedBeginning tempered_;  // what is left of it
   RowEnd row_end_;
-  int64_t settled_row_ = -1;
-  int settlements_at_row_ = 0;
-  int64_t comparable_row_ = -1;
+  int64_t settled_row_ = -1;     // row before which the last settlement was attempted
+  int settlements_at_row_ = 0;   // attempted there
+  int64_t comparable_row_ = -1;  // rows at which MakeComparable was done last
   uint64_t settlements_ = 0;
   int reexpansions_ = 0;
   int64_t abandoned_rows_ = 0;  // propagated by expansions that were replaced

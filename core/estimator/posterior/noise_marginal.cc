@@ -23,7 +23,7 @@ constexpr double kNegligibleMember = 9;
 // tail up to which their variance is finite (pareto_tail.h). The number alone would not tell: where
 // draws are too narrow, it is large until one falls far out.
 constexpr double kEnough = 0.5;
-constexpr double kMostShape = 0.5;
+constexpr double kMaxShape = 0.5;
 // Least power of the likelihood from which is drawn.
 constexpr double kWidestPower = 1.0 / 16;
 // If the expansion's own error makes up more than this share of χ², the noise is not known.
@@ -282,7 +282,7 @@ absl::StatusOr<Vector> MarginalizeNoise(const ResolvedProblem& problem,
     Reweigh(cost.power() * marginal.LogFactors(etas), drawn);
     const double count = CountIndependent(drawn.weights);
     const double shape =
-        std::max(kMostShape, TailShape(drawn.weights.array().log()).value_or(kMostShape));
+        std::max(kMaxShape, TailShape(drawn.weights.array().log()).value_or(kMaxShape));
     if (best && (shape > least_shape || (shape == least_shape && count <= most))) continue;
     for (Eigen::Index i = 0; i < widening.size(); ++i) {
       const double before_width = IntervalWidth(drawn.scores.col(i), plain);
@@ -292,7 +292,7 @@ absl::StatusOr<Vector> MarginalizeNoise(const ResolvedProblem& problem,
     best = std::move(drawn);
     least_shape = shape;
     most = count;
-    if (shape == kMostShape && count >= kEnough * before) break;
+    if (shape == kMaxShape && count >= kEnough * before) break;
   }
   best->minima = std::move(draws.minima);
   draws = *std::move(best);

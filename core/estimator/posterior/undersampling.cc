@@ -25,7 +25,7 @@ constexpr double kMoved = 2;
 // Turning points between two samples from which on a response is said to have images: with four
 // samples a period, or with two where there are so few parameters that all minima are searched.
 constexpr double kRare = 0.5, kRareIfSearched = 1;
-constexpr int kMostSearched = 3;
+constexpr int kMaxSearched = 3;
 constexpr double kInexact = 0.1;  // of a number of turning points between two samples
 
 struct Times {
@@ -195,7 +195,7 @@ std::optional<Aliased> AliasedChannel(const Findings& findings, const Times& tim
                                       const Matrix& outputs) {
   const RowBlock& beginning = findings.record->beginning();
   const int m = findings.problem->channels();
-  const double rare = findings.problem->dimension() > kMostSearched ? kRare : kRareIfSearched;
+  const double rare = findings.problem->dimension() > kMaxSearched ? kRare : kRareIfSearched;
   std::optional<Aliased> least;
   for (int c = 0; c < m; ++c) {
     const std::vector<int> rows = RowsOf(beginning, m, c);

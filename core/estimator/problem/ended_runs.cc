@@ -21,7 +21,7 @@ bool AreSumsOf(const MismatchSums& sums, Eigen::Index terms) {
 bool AreShapes(const std::vector<ScoreMixture>& shapes) {
   return std::ranges::all_of(shapes, [](const ScoreMixture& shape) {
     const Eigen::Index count = shape.log_weights.size();
-    return count == 0 || (count <= ScoreMixture::kMostComponents && shape.log_weights.allFinite() &&
+    return count == 0 || (count <= ScoreMixture::kMaxComponents && shape.log_weights.allFinite() &&
                           std::isfinite(shape.first) && shape.step > 0 && shape.step < 1);
   });
 }

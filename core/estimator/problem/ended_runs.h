@@ -63,8 +63,8 @@ struct EndedRuns {
   Region region = Region::WholePrior(1);  // of the shared germs
   std::shared_ptr<const Basis> basis;     // Legendre polynomials over the region, S terms
 
-  // As those of AbsorbedRows (expansion/regional_expansion.h); the sums are about the region's
-  // centre, in the basis.
+  // What the rows of the ended runs add, with the meanings that AbsorbedRows gives these names
+  // (expansion/absorbed_rows.h); the sums are about the region's centre, in the basis.
   std::vector<ChannelSums> sums;
   Vector discount;
   double own_error = 0;

@@ -6,8 +6,8 @@
 namespace polyest::internal {
 namespace {
 
-constexpr double kRounding = 1e-9;     // of a mean
-constexpr double kMostCounted = 9e15;  // up to which numbers count exactly
+constexpr double kRounding = 1e-9;    // of a mean
+constexpr double kMaxCounted = 9e15;  // up to which numbers count exactly
 
 }  // namespace
 
@@ -41,7 +41,7 @@ int64_t OctaveSums::CountAbove(double limit) const {
 
 bool OctaveSums::IsConsistent() const {
   if (count_.size() != kOctaves || sum_.size() != kOctaves) return false;
-  if (!(count_.sum() <= kMostCounted)) return false;
+  if (!(count_.sum() <= kMaxCounted)) return false;
   for (int k = 0; k < kOctaves; ++k) {
     if (!(count_[k] >= 0) || count_[k] != std::floor(count_[k])) return false;
     // An empty octave has no sum, and another one's mean lies in it up to rounding.

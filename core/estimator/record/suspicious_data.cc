@@ -26,7 +26,7 @@ constexpr int64_t kMinConstant = 3;  // samples of one value before it is said n
 constexpr int64_t kMinDropouts = 4;  // to one value before they are mentioned
 constexpr int64_t kMinBends = 32;    // samples of an input before its bends are judged
 constexpr int kOfLines = 1;          // knots that straight lines need
-constexpr double kMostLost = 0.02;   // of an amplitude, by straight lines
+constexpr double kMaxLost = 0.02;    // of an amplitude, by straight lines
 constexpr double kMinPerPeriod = 5;  // samples, for a curve
 constexpr int64_t kMinPlateaus = 4;  // at either end of a range before they are mentioned
 // A fit explains its samples only with so many degrees of freedom left, and noise that is learned
@@ -178,7 +178,7 @@ class Warnings {
     const double w = 2 * std::asin(std::min(1.0, chord / 2));
     const double per_period = 2 * std::numbers::pi / w;
     const double lost = w * w / 12;
-    if (knots_needed == kOfLines && lost > kMostLost) {
+    if (knots_needed == kOfLines && lost > kMaxLost) {
       Add("%s: about %.2g samples of the streamed input are a period of it, and straight lines "
           "between them lose %.2g %% of its amplitude; let it follow the smooth curve, sample it "
           "more often, or say that it is held if it is",

@@ -40,11 +40,11 @@ double ResidualScatter::MeanSquare(Eigen::Index channel) const {
 }
 
 double ResidualScatter::Dispersion() const {
-  constexpr double kMostCorrelation = 0.999;
+  constexpr double kMaxCorrelation = 0.999;
   double largest = 1;
   for (const Channel& channel : channels_) {
     if (channel.samples == 0) continue;
-    const double r = std::clamp(channel.products / channel.squares, 0.0, kMostCorrelation);
+    const double r = std::clamp(channel.products / channel.squares, 0.0, kMaxCorrelation);
     const double of_pairs = channel.squares / channel.samples * (1 + r) / (1 - r);
     const double of_blocks =
         channel.sums == 0 ? 0 : channel.squares_of_sums / (kOfBlock * channel.sums);

@@ -17,7 +17,7 @@ namespace {
 constexpr double kLeastGain = 0.5;
 constexpr double kLeastShift = 1;
 constexpr double kNearlyAsLarge = 0.9;  // times the largest score
-constexpr size_t kMostOthers = 3;
+constexpr size_t kMaxOthers = 3;
 
 bool Has(const Estimate& estimate, std::initializer_list<DiagnosticCode> codes) {
   return std::ranges::any_of(estimate.diagnostics, [codes](const Diagnostic& diagnostic) {
@@ -28,7 +28,7 @@ bool Has(const Estimate& estimate, std::initializer_list<DiagnosticCode> codes) 
 // Returns "; another value of x.offset or m would explain it nearly as well", or an empty text.
 std::string Others(const std::vector<ScoreTest>& scores) {
   std::vector<std::string> names;
-  for (size_t i = 1; i < scores.size() && names.size() < kMostOthers; ++i) {
+  for (size_t i = 1; i < scores.size() && names.size() < kMaxOthers; ++i) {
     if (std::abs(scores[i].score) < kNearlyAsLarge * std::abs(scores[0].score)) break;
     names.push_back(scores[i].name);
   }

@@ -16,15 +16,15 @@
 namespace polyest::internal {
 namespace {
 
-constexpr int64_t kMostRows = 65'536;
+constexpr int64_t kMaxRows = 65'536;
 constexpr int64_t kFirstRows = 256;  // from which steps and the sampling interval are found
 // A difference of trajectories should be about as large as the noise, in the norm over the record:
 // far above the rounding and far below what is not linear.
-constexpr double kLeastNorm = 0.03, kMostNorm = 30;
-constexpr int kMostPasses = 4;
+constexpr double kLeastNorm = 0.03, kMaxNorm = 30;
+constexpr int kMaxPasses = 4;
 // Largest distance of an estimate from the minimum of the cost, in standard deviations. It is not 0
 // where the noise's correlation is unknown, since the estimate averages over that.
-constexpr double kMostFromMinimum = 2;
+constexpr double kMaxFromMinimum = 2;
 // Part of g that the uncertain parameters must leave, squared.
 constexpr double kLeastOwn = 1e-6;
 
@@ -147,7 +147,7 @@ class Neighbours {
   static constexpr double kLeastFactor = 1e-6;
 
   static double Adapted(double step, double norm, double most) {
-    if (!std::isfinite(norm) || (norm >= kLeastNorm && norm <= kMostNorm)) return step;
+    if (!std::isfinite(norm) || (norm >= kLeastNorm && norm <= kMaxNorm)) return step;
     const double factor = std::clamp(1 / norm, kLeastFactor, 1 / kLeastFactor);
     return std::copysign(std::min(factor * std::abs(step), most), step);
   }
@@ -192,7 +192,7 @@ class LinearTests {
     const Vector slope = gram.col(0).segment(1, n_) -
                          regularization * prior.Gradient(at.xi()).cwiseProduct(at.steps());
     to_minimum_ = factor_.Solve(slope);
-    is_minimum_ = slope.dot(to_minimum_) <= kMostFromMinimum * kMostFromMinimum;
+    is_minimum_ = slope.dot(to_minimum_) <= kMaxFromMinimum * kMaxFromMinimum;
     jacobian_ = prior.Jacobian(at.xi()) * at.steps().asDiagonal();
     deviations_.resize(n_);
     for (Eigen::Index i = 0; i < n_; ++i) {
@@ -200,7 +200,7 @@ class LinearTests {
     }
   }
 
-  // Whether the estimate is a minimum within kMostFromMinimum.
+  // Whether the estimate is a minimum within kMaxFromMinimum.
   bool is_minimum() const { return is_minimum_; }
 
   // Returns the test of a quantity, with its place among the trajectories; nothing if the
@@ -250,11 +250,11 @@ absl::StatusOr<Matrix> AdaptedGram(const ResidualPass& pass, int64_t rows, doubl
   Matrix gram;
   bool whole = rows <= kFirstRows;
   for (int number = 1;; ++number) {
-    whole = whole || number == kMostPasses;
+    whole = whole || number == kMaxPasses;
     const Matrix thetas = neighbours.Thetas();
     POLYEST_ASSIGN_OR_RETURN(gram, GramOf(pass, thetas, whole ? rows : kFirstRows, late_s, stop));
     const Vector norms = gram.diagonal().segment(1, thetas.rows() - 1).cwiseSqrt();
-    if (number >= kMostPasses && whole) return gram;
+    if (number >= kMaxPasses && whole) return gram;
     const bool changed = neighbours.Adapt(norms);
     if (!changed && whole) return gram;
     whole = whole || !changed;
@@ -335,7 +335,7 @@ absl::StatusOr<FixedValueTests> TestFixedQuantities(const ResolvedProblem& probl
                                                     const std::vector<ChannelNoise>& learned,
                                                     const Estimate& estimate, const Stop& stop) {
   FixedValueTests tests;
-  rows = std::min(rows, kMostRows);
+  rows = std::min(rows, kMaxRows);
   if (!AreDefinedFor(problem) || rows == 0) return tests;
   POLYEST_ASSIGN_OR_RETURN(const std::vector<ChannelNoise> noise,
                            NoiseOfResiduals(problem, store, rows, learned, estimate, stop));

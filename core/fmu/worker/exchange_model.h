@@ -44,7 +44,7 @@ class ExchangeModel final : public StateSpaceModel {
   const bool uses_time_;
   const std::vector<int> states_of_outputs_;  // see InstanceFactory
   std::vector<std::unique_ptr<Instance>> instances_;
-  // Of one row. All calls come from one thread: a worker computes in no other.
+  // Values of one row, for calls. All calls come from one thread: a worker computes in no other.
   mutable std::vector<double> states_, inputs_, result_;
 };
 

@@ -38,6 +38,9 @@ struct ModelDescription {
   std::vector<Quantity> parameters;  // θ, initial states among them
   std::vector<Quantity> inputs;      // u
   std::vector<Quantity> outputs;     // y, what can be measured
+  // What else tells the model from others with the same description, such as the checksum of a
+  // file: what was computed with one identity is not used with another one. Empty for equations.
+  std::string identity{};
 
   // Returns the parameter's index in `parameters`; nothing when there is none of this name.
   std::optional<int> FindParameter(std::string_view parameter) const;

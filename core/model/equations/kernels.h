@@ -17,14 +17,14 @@ struct Instruction;
 using Kernel = void (*)(const Instruction& instruction, double* const* slots, Eigen::Index rows);
 
 struct Instruction {
-  static constexpr int kMostOperands = 5;
+  static constexpr int kMaxOperands = 5;
 
   Kernel kernel;
   std::uint32_t result;
-  std::uint32_t operands[kMostOperands];  // slots; one of them may be the result's
-  // Of each operand's slot: ~0, or 0 where its values are the same for all rows. The values of a
-  // row begin at (row & mask).
-  std::int32_t masks[kMostOperands];
+  std::uint32_t operands[kMaxOperands];  // slots; one of them may be the result's
+  // Masks of the operands' slots: ~0, or 0 where the values are the same for all rows. The values
+  // of a row begin at (row & mask).
+  std::int32_t masks[kMaxOperands];
   const Lookup* lookup;  // the table, for a lookup
 };
 

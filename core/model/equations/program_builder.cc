@@ -81,7 +81,7 @@ void ProgramBuilder::Order(NodeId root) {
       path.pop_back();
       continue;
     }
-    if (next < Instruction::kMostOperands && step(id).operands[next] >= 0) {
+    if (next < Instruction::kMaxOperands && step(id).operands[next] >= 0) {
       path.emplace_back(step(id).operands[next++], 0);
       continue;
     }
@@ -199,7 +199,7 @@ void ProgramBuilder::PlaceResults() {
 Instruction ProgramBuilder::InstructionOf(NodeId id) const {
   const Step& current = step(id);
   Instruction instruction{};
-  for (int i = 0; i < Instruction::kMostOperands; ++i) {
+  for (int i = 0; i < Instruction::kMaxOperands; ++i) {
     // A missing operand is replaced by the first one.
     const NodeId operand = current.operands[current.operands[i] < 0 ? 0 : i];
     instruction.operands[i] = step(operand).slot;

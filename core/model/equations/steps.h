@@ -27,7 +27,7 @@ struct Inner {
 struct Step {
   Operation operation = Operation::kConstant;
   // Those of `inner` come first, then the others in order; −1 after the last.
-  std::array<NodeId, Instruction::kMostOperands> operands{};
+  std::array<NodeId, Instruction::kMaxOperands> operands{};
   std::optional<Inner> inner = std::nullopt;
   int uses = 0;       // number of steps and roots that read it
   int last_use = -1;  // position of the last instruction that reads it

@@ -12,9 +12,16 @@
 #include <vector>
 
 #include "core/common/field_error.h"
+#include "core/common/status.h"
 
 namespace polyest::internal {
 namespace {
+
+// A number that a message lacks is 0.
+absl::Status RequireStdDev(const char* family, double std_dev) {
+  if (std_dev != 0) return absl::OkStatus();
+  return InvalidField({family, "std_dev"}, "is missing, or 0; it must be > 0");
+}
 
 absl::StatusOr<UncertainParameter> ToTruncatedNormal(
     const std::string& name, const v1::UncertainParameter::TruncatedNormalPrior& prior) {
@@ -22,6 +29,7 @@ absl::StatusOr<UncertainParameter> ToTruncatedNormal(
   if (!prior.has_lower() && !prior.has_upper()) {
     return InvalidField("truncated_normal", "lower or upper must be given");
   }
+  POLYEST_RETURN_IF_ERROR(RequireStdDev("truncated_normal", prior.std_dev()));
   return UncertainParameter::TruncatedNormal(name, prior.mean(), prior.std_dev(),
                                              prior.has_lower() ? prior.lower() : -kInfinity,
                                              prior.has_upper() ? prior.upper() : kInfinity);
@@ -50,6 +58,7 @@ absl::StatusOr<UncertainParameter> ToPrior(const v1::UncertainParameter& paramet
     }
     case v1::UncertainParameter::kNormal: {
       const auto& prior = parameter.normal();
+      POLYEST_RETURN_IF_ERROR(RequireStdDev("normal", prior.std_dev()));
       return UncertainParameter::Normal(name, prior.mean(), prior.std_dev());
     }
     case v1::UncertainParameter::kBeta: {
@@ -63,6 +72,7 @@ absl::StatusOr<UncertainParameter> ToPrior(const v1::UncertainParameter& paramet
     }
     case v1::UncertainParameter::kLognormal: {
       const auto& prior = parameter.lognormal();
+      POLYEST_RETURN_IF_ERROR(RequireStdDev("lognormal", prior.std_dev()));
       return UncertainParameter::Lognormal(name, prior.mean(), prior.std_dev());
     }
     case v1::UncertainParameter::kTruncatedNormal:

@@ -114,6 +114,8 @@ TEST_F(CompareTest, RefusesWhatCannotBeCompared) {
   const std::string one = File("one.csv", "t,position\n0.5,0.1\n");
   EXPECT_THAT(refusal({linear_, one, "--hold-out", "0.3"}),
               HasSubstr("--hold-out: 0.3 of 1 rows leaves none to predict"));
+  EXPECT_THAT(refusal(std::vector<std::string>(20, linear_)),
+              HasSubstr("20 problems are more than 19"));
   for (const char* const number : {"-1", "far", "nan", "inf"}) {
     EXPECT_THAT(refusal({linear_, data_, "--horizon", number}), HasSubstr("--horizon")) << number;
     EXPECT_THAT(refusal({linear_, data_, "--hold-out", number}), HasSubstr("--hold-out")) << number;

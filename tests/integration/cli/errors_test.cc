@@ -233,6 +233,15 @@ TEST_F(ErrorsTest, ADeadlineThatPasses) {
               HasSubstr("eadline"));
 }
 
+TEST_F(ErrorsTest, ADeadlineOfAStreamThatWaitsForTheTimeOfItsRows) {
+  DaemonProcess daemon;
+  const std::string slow = File("slow.csv", "t,x\n0.1,0.8\n1000,0.3\n");
+  const Finished run = Run({"stream", File("p.json", kProblem), slow, "--batch", "1", "--rate", "1",
+                            "--server", daemon.address(), "--deadline", "0.5"});
+  EXPECT_EQ(run.exit_status, 3) << run.err;
+  EXPECT_THAT(run.err, HasSubstr("eadline"));
+}
+
 TEST_F(ErrorsTest, AnUnknownModelOrFigure) {
   EXPECT_THAT(OneLine(Run({"models", "spring"}), 2), HasSubstr("duffing"));
   const Finished figure = Run({"paper", "99"});
@@ -257,9 +266,9 @@ TEST_F(ErrorsTest, StudiesThatCannotBeMade) {
   const std::string problem = File("p.json", kProblem);
   for (const char* const command : {"sensitivity", "design"}) {
     EXPECT_THAT(OneLine(Run({command, problem}), 2), HasSubstr("--until"));
-    EXPECT_THAT(OneLine(Run({command, problem, "--until", "0"}), 2), HasSubstr("untilS: 0"));
+    EXPECT_THAT(OneLine(Run({command, problem, "--until", "0"}), 2), HasSubstr("--until: 0"));
     EXPECT_THAT(OneLine(Run({command, problem, "--until", "1", "--step", "-1"}), 2),
-                HasSubstr("stepS: -1"));
+                HasSubstr("--step: -1"));
     EXPECT_THAT(OneLine(Run({command, problem, "--until", "1", "--outputs", "x,q"}), 2),
                 AllOf(HasSubstr("\"q\""), HasSubstr("x, v, a")));
     EXPECT_THAT(OneLine(Run({command, problem, "--until", "1", "--outputs", "x,K[1,1]"}), 2),
@@ -282,18 +291,18 @@ TEST_F(ErrorsTest, AnOptionThatIsRefusedIsNotBlamedOnAFile) {
   const std::string problem = File("p.json", kProblem);
   const std::string data = File("d.csv", kData);
   EXPECT_THAT(OneLine(Run({"posterior", problem, data, "--quantiles", "2"}), 2),
-              StartsWith("polyest: probabilities[0]: 2 must"));
+              StartsWith("polyest: --quantiles: 2 must"));
   EXPECT_THAT(OneLine(Run({"posterior", problem, data, "--joint", "k,c,d"}), 2),
               HasSubstr("\"k,c,d\" must be two parameters"));
   EXPECT_THAT(OneLine(Run({"posterior", problem, data, "--joint", "k,K[1,1]"}), 2),
-              AllOf(StartsWith("polyest: joints[0]"), HasSubstr("K[1,1]")));
+              AllOf(StartsWith("polyest: --joint: "), HasSubstr("K[1,1]")));
   EXPECT_THAT(OneLine(Run({"design", problem, "--until", "0"}), 2),
-              StartsWith("polyest: untilS: 0 must"));
+              StartsWith("polyest: --until: 0 must"));
   DaemonProcess daemon;
   EXPECT_THAT(
       OneLine(Run({"stream", problem, data, "--server", daemon.address(), "--session", "No Name"}),
               2),
-      StartsWith("polyest: sessionId: "));
+      StartsWith("polyest: --session: "));
 }
 
 TEST_F(ErrorsTest, BadUsage) {

@@ -41,6 +41,14 @@ TEST(Report, NamesTheServerThatRefused) {
   EXPECT_EQ(err.str(), "polyest: server rig:50051: no route\n");
 }
 
+TEST(Report, NamesTheOptionInPlaceOfTheField) {
+  std::ostringstream err;
+  EXPECT_EQ(Report(InvalidField("probabilities[0]", "2 must lie between 0 and 1"), "", err), 2);
+  EXPECT_EQ(Report(InvalidField("fixed.q", "unknown"), "", err), 2);
+  EXPECT_EQ(err.str(),
+            "polyest: --quantiles: 2 must lie between 0 and 1\npolyest: fixed.q: unknown\n");
+}
+
 TEST(InFile, PutsTheFileInFrontOfTheField) {
   EXPECT_EQ(InFile(InvalidField("fixed.q", "unknown"), "p.json", "d.csv").message(),
             "p.json: fixed.q: unknown");

@@ -133,6 +133,8 @@ class Client {
   v1::SessionService::Stub& sessions() { return *sessions_; }
   // Adds the token to a call made on a stub.
   void Identify(grpc::ClientContext& call) const { connection_->Identify(call); }
+  // Lets a call made on a stub end at the `end` of the options, if there is one.
+  void LimitToEnd(grpc::ClientContext& call) const;
   // Returns what Identify would add now; it shows whether the token has changed.
   std::string Authorization() const { return connection_->Authorization(); }
   // Returns the daemon's address, HOST:PORT.
@@ -141,7 +143,7 @@ class Client {
  private:
   template <typename Stub, typename Response, typename Request>
   using Method = grpc::Status (Stub::*)(grpc::ClientContext*, const Request&, Response*);
-  // Adds the token and the deadline of the options to a call.
+  // Adds the token and the limits of the options to a call.
   void Prepare(grpc::ClientContext& call) const;
   // Returns the status of a call, with a hint if no connection could be made.
   absl::Status StatusOf(const grpc::Status& status) const;

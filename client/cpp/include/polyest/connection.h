@@ -26,6 +26,8 @@ struct ClientTls {
 struct ClientOptions {
   // How long a call may take, a stream such as a watch included; none: without limit.
   std::optional<std::chrono::milliseconds> deadline{};
+  // When all calls must have ended, streams of measurements included; none: never.
+  std::optional<std::chrono::steady_clock::time_point> end{};
   // Time without traffic after which the connection is probed, ≥ 10 s: the daemon closes
   // connections that are probed more often.
   std::chrono::milliseconds keepalive{20'000};

@@ -37,7 +37,7 @@ def find_program(given: Union[str, os.PathLike[str], None]) -> str:
              for folder in place.parents for program in folder.glob("build/*/bin/polyestd")
              if os.access(program, os.X_OK)]
     if not built:
-        raise Unavailable("polyestd is not installed: it is in the package polyestd; or give its "
+        raise Unavailable("polyestd is not installed: it is in the package polyest; or give its "
                           "path with daemon=… or in the environment variable POLYEST_DAEMON")
     return str(max(built, key=lambda program: program.stat().st_mtime))
 

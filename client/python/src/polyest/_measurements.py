@@ -18,6 +18,8 @@ from polyest.io._recording import Batch, Recording
 
 Measurements = measurements_pb2.Measurements
 
+_LAST_RUN = 2**31 - 1
+
 # A header with its unit: "Disp [mm]", "Disp (mm)", "Disp / mm" or "Disp / (mm)".
 _HEADER = re.compile(r"^(?P<name>.*?)\s*(?:\[(?P<a>[^\]]*)\]|\((?P<b>[^)]*)\)"
                      r"|/\s\(?(?P<c>[^\s()]\S*?)\)?)$")
@@ -145,8 +147,11 @@ class MeasurementConverter:
             return
         header, _, column = found
         numbers = floats(header, column)
-        if not np.array_equal(numbers, np.floor(numbers)):
-            raise refuse(header, "a run must be a whole number in every row")
+        wrong = np.flatnonzero(~((numbers == np.floor(numbers)) & (0 <= numbers)
+                                 & (numbers <= _LAST_RUN)))
+        if wrong.size:
+            raise refuse(header, f"row {wrong[0]}: {numbers[wrong[0]]:.15g} must be a whole number "
+                         f"from 0 to {_LAST_RUN}")
         message.run.extend(int(number) for number in numbers)
         used.append(header)
 

@@ -56,7 +56,7 @@ def read(file: Union[str, os.PathLike[str]]) -> Iterator[session_service_pb2.Ses
         if source.readline(len(_FIRST_LINE)) != _FIRST_LINE:
             raise InvalidInput(f"{os.fspath(file)}: is not a session file written by an export")
         while True:
-            length = _read_varint(source)
+            length = _read_varint(source, os.fspath(file))
             if length is None:
                 return
             encoded = source.read(length)
@@ -89,15 +89,15 @@ def _varint(value: int) -> bytes:
     return bytes(out)
 
 
-def _read_varint(source: BinaryIO) -> Optional[int]:
+def _read_varint(source: BinaryIO, file: str) -> Optional[int]:
     value, shift = 0, 0
     while byte := source.read(1):
         value |= (byte[0] & 0x7F) << shift
         if value >> 31:  # no message of protobuf is that long
-            raise InvalidInput("a session file is damaged: it has a record beyond 2 GiB")
+            raise InvalidInput(f"{file}: is damaged: a record is longer than 2 GiB")
         if byte[0] < 0x80:
             return value
         shift += 7
     if shift:
-        raise InvalidInput("a session file ends in the middle of a length")
+        raise InvalidInput(f"{file}: ends in the middle of a length")
     return None

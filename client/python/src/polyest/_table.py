@@ -38,9 +38,10 @@ class Table:
         self.columns: dict[str, Array] = {}
         names = getattr(getattr(data, "dtype", None), "names", None)
         if isinstance(data, Mapping):
-            self.columns = {str(name): _array(values) for name, values in data.items()}
+            self.columns = {str(name): _array(str(name), values)
+                            for name, values in data.items()}
         elif names:
-            self.columns = {name: _array(data[name]) for name in names}
+            self.columns = {name: _array(name, data[name]) for name in names}
         elif hasattr(data, "columns") and hasattr(data, "__getitem__"):
             self._take_frame(data)
         else:
@@ -80,10 +81,13 @@ class Table:
         return None
 
 
-def _array(values: Any) -> Array:
+def _array(name: str, values: Any) -> Array:
     """Returns a column as an array; what a masked array hides is missing."""
     if not isinstance(values, np.ma.MaskedArray):
-        return np.asarray(values)
+        try:
+            return np.asarray(values)
+        except ValueError as error:
+            raise refuse(name, f"is no column of numbers: {error}") from error
     kind = values.dtype.kind
     nothing: Any = None
     if kind in "mM":
@@ -118,7 +122,7 @@ def _nanoseconds(date: Any) -> np.datetime64:
 def floats(name: str, values: Array) -> Floats:
     """Returns a column as numbers; NaN is a missing sample. Raises InvalidInput for others."""
     if values.dtype.kind == "O":
-        values = np.array([np.nan if value is None else value for value in values])
+        values = _array(name, [np.nan if value is None else value for value in values])
     if values.dtype.kind not in "fiub":
         raise refuse(name, f"has values of type {values.dtype}; it must have numbers")
     numbers: Floats = values.astype(np.float64)

@@ -17,7 +17,7 @@ from polyest._proto.v1 import problem_pb2
 from polyest.errors import InvalidInput
 from polyest.noise import Noise
 from polyest.priors import Prior
-from polyest.signals import Signal, Streamed
+from polyest.signals import Interpolation, Signal, Streamed
 
 if TYPE_CHECKING:
     from polyest._table import Data
@@ -62,11 +62,14 @@ class Problem:
     def equations(cls, *, states: Mapping[str, str], outputs: Mapping[str, str],
                   parameters: Optional[Mapping[str, float]] = None, inputs: Sequence[str] = (),
                   units: Optional[Mapping[str, str]] = None,
-                  intermediates: Optional[Mapping[str, str]] = None) -> Problem:
+                  intermediates: Optional[Mapping[str, str]] = None,
+                  tables: Optional[Mapping[str, tuple[Sequence[float], Sequence[float]]]] = None
+                  ) -> Problem:
         """Returns a problem of a model given by its equations.
 
         `states` has the time derivative of each state, `outputs` the expression of each output,
         `parameters` defaults, `units` units by name. A state's initial value is `<state>_0`.
+        `tables` has the points of functions of one argument: their places and their values.
         """
         equations: dict[str, Any] = {"states": dict(states), "outputs": dict(outputs)}
         for name, value in (("parameters", parameters), ("units", units),
@@ -75,6 +78,9 @@ class Problem:
                 equations[name] = dict(value)
         if inputs:
             equations["inputs"] = list(inputs)
+        if tables:
+            equations["tables"] = {name: {"x": list(x), "value": list(value)}
+                                   for name, (x, value) in tables.items()}
         return cls({"model": {"equations": equations}})
 
     @classmethod
@@ -88,15 +94,19 @@ class Problem:
         return self
 
     def uncertain(self, name: str, prior: Prior, *, per_run: bool = False,
-                  drift: Union[float, tuple[float, float], None] = None) -> Problem:
+                  drift: Union[float, tuple[float, float], None] = None,
+                  population: bool = False) -> Problem:
         """Makes a quantity uncertain; with `per_run` each run of the record has its own value.
 
+        With `population`, too, the runs' values belong to a population, which is estimated.
         `drift` makes it a random walk: its rate in the quantity's unit/√s, or the bounds of an
         unknown rate, which is then estimated, too.
         """
         entry: dict[str, Any] = {"name": name, **prior.as_json()}
         if per_run:
             entry["perRun"] = True
+        if population:
+            entry["population"] = True
         if isinstance(drift, tuple):
             entry["drift"] = {"randomWalk": {"unknown": True, "lower": drift[0],
                                              "upper": drift[1]}}
@@ -136,9 +146,13 @@ class Problem:
         self._document.setdefault("inputs", []).append({"name": name, **signal.as_json()})
         return self
 
-    def stream(self, name: str, *, hold: bool = False) -> Problem:
-        """Takes an input of the model from the measurements, in a column of its name."""
-        return self.drive(name, Streamed(hold=hold))
+    def stream(self, name: str, *, hold: bool = False,
+               interpolation: Optional[Interpolation] = None) -> Problem:
+        """Takes an input of the model from the measurements, in a column of its name.
+
+        `interpolation` and `hold` say how it runs between its samples (see `Streamed`).
+        """
+        return self.drive(name, Streamed(hold=hold, interpolation=interpolation))
 
     def measure(self, output: str, noise: Union[float, Noise], *, column: str = "",
                 unit: str = "") -> Problem:
@@ -246,8 +260,21 @@ def _plain(value: Any) -> Any:
 ProblemLike = Union[Problem, Mapping[str, Any], str, "os.PathLike[str]", problem_pb2.Problem]
 
 
-# Where protobuf says that a field is wrong.
-_PLACE = re.compile(r'at "Problem\.([^"]+)"')
+# Where protobuf says that a field is wrong: with quotes or, in older versions, without.
+_PLACE = re.compile(r'at "?Problem\.?((?:\w+(?:\[[^\]]*\])?\.?)*)')
+_PARENT = re.compile(r"Failed to parse (\w+) field: ")
+_UNKNOWN = re.compile(r'no field named "([^"]*)"')
+
+
+def _refusal(sentence: str) -> tuple[str, str]:
+    """Returns the field that a sentence of protobuf's is about, and the rule that it breaks."""
+    place = _PLACE.search(sentence)
+    field = place[1].rstrip(".") if place else ".".join(_PARENT.findall(sentence))
+    unknown = _UNKNOWN.search(sentence)
+    if unknown:
+        return f"{field}.{unknown[1]}".lstrip("."), "is not a field"
+    rule = _PARENT.split(sentence)[-1]
+    return field, _PLACE.split(rule)[0].rstrip(" .")
 
 
 def _read(path: Union[str, os.PathLike[str]]) -> dict[str, Any]:
@@ -294,6 +321,6 @@ def to_message(problem: ProblemLike) -> problem_pb2.Problem:
     try:
         json_format.ParseDict(document, message)
     except json_format.ParseError as error:
-        at = _PLACE.search(str(error))
-        raise InvalidInput(f"{place}{error}", field=at[1] if at else "") from error
+        field, rule = _refusal(str(error))
+        raise InvalidInput(f"{place}{error}", field=field, rule=rule) from error
     return message

@@ -153,6 +153,24 @@ TEST_F(BadSnapshot, IsOneOfAnotherProblem) {
   EXPECT_TRUE(refused([](Problem& p) { p.derived = {{"v0", "0 * k"}}; }));
 }
 
+// The description of a model, with another identity.
+class OtherFile final : public Model {
+ public:
+  explicit OtherFile(const ModelDescription& description) : description_(description) {
+    description_.identity = "another file";
+  }
+  const ModelDescription& description() const override { return description_; }
+
+ private:
+  ModelDescription description_;
+};
+
+TEST_F(BadSnapshot, IsOneOfAModelFromAnotherFile) {
+  Problem problem = problem_;
+  problem.model = std::make_shared<OtherFile>(problem_.model->description());
+  EXPECT_NE(FingerprintOf(problem), FingerprintOf(problem_));
+}
+
 TEST_F(BadSnapshot, IsOneOfAnotherVersion) {
   std::string body = Body();
   // The version follows cereal's mark of endianness, the size of the name and the name.

@@ -247,7 +247,7 @@ TEST_F(FaultyFmu, ThatCanBeInstantiatedOnceWithoutStateHasAProcessForEachPoint) 
   EnsemblePropagator propagator(one.specification, &one.inputs);
   Matrix output(1, 1);
   ASSERT_TRUE(propagator.Advance(std::vector{0.1}, output, Stop()).ok());
-  FmuEnsemble many("once_without_state_cs2", WorkerEnsemble::kMostOfOneTrajectory, {"x"});
+  FmuEnsemble many("once_without_state_cs2", WorkerEnsemble::kMaxOfOneTrajectory, {"x"});
   const absl::Status refused = many.TryPropagate({0.1}).status();
   EXPECT_EQ(refused.code(), absl::StatusCode::kResourceExhausted);
   EXPECT_THAT(refused.message(), AllOf(HasSubstr("256 trajectories need as many processes"),

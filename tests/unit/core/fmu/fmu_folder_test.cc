@@ -131,6 +131,22 @@ TEST_F(FmuFolder, SeesFilesThatComeChangeAndGo) {
   EXPECT_THAT(fmus.Models(), IsEmpty());
 }
 
+// A model that was compiled anew has the same description.
+TEST_F(FmuFolder, TellsFilesOfOneDescriptionApart) {
+  const ModelFolder fmus = Open();
+  Copy("oscillator_me2", "one");
+  Copy("oscillator_me2", "two");
+  zip_t* const archive = zip_open((folder_ / "two.fmu").c_str(), 0, nullptr);
+  zip_file_add(archive, "resources/table.txt", zip_source_buffer(archive, "1 2", 3, 0), 0);
+  ASSERT_EQ(zip_close(archive), 0);
+  const auto identity = [&](const char* name) {
+    return (*fmus.Find(name))->description().identity;
+  };
+  EXPECT_NE(identity("one"), identity("two"));
+  Copy("oscillator_me2", "two");
+  EXPECT_EQ(identity("one"), identity("two"));
+}
+
 TEST_F(FmuFolder, MayLackAnFmuForATime) {
   Copy("oscillator_me2", "rig");
   FmuEnsemble ensemble(*Open().Find("rig"), 1, {"x"});

@@ -51,6 +51,17 @@ TEST(UmBridgeDescription, HasWhatTheFileSays) {
   EXPECT_EQ(read->servers.give_up_after_s, 0);
 }
 
+TEST(UmBridgeDescription, TellsModelsApartAndNotServers) {
+  const auto identity = [](const std::string& json) {
+    const auto read = ParseUmBridgeDescription("spring", json);
+    return read.ok() ? read->model.identity : read.status().ToString();
+  };
+  EXPECT_NE(identity(With("")), identity(With(R"("config": {"level": 3})")));
+  EXPECT_NE(identity(With(R"("timesS": [1])")), identity(With(R"("timesS": [2])")));
+  EXPECT_EQ(identity(With("")), identity(R"({"urls": ["http://elsewhere:1"],
+                                "parameters": [{"name": "k"}], "outputs": [{"name": "x"}]})"));
+}
+
 TEST(UmBridgeDescription, HasInputs) {
   const auto read = ParseUmBridgeDescription(
       "spring", With(R"("inputs": [{"name": "force", "unit": "N", "meaning": "at the mass"}])"));

@@ -215,7 +215,7 @@ TEST(RowReorder, RefusesMoreRowsThanItMayHoldBack) {
   RowReorder reorder({"x"}, 1'000);
   Samples batch;
   batch.columns = {{"x", {}, {}}};
-  for (int64_t row = 0; row < RowReorder::kMostHeldRows; ++row) {
+  for (int64_t row = 0; row < RowReorder::kMaxHeldRows; ++row) {
     batch.time_s.push_back(0.001 * static_cast<double>(row));
     batch.columns[0].value.push_back(1);
   }

@@ -154,7 +154,10 @@ class Feeder(threading.Thread):
                 if time.monotonic() > self._last_chance:
                     raise
                 self._say(f"{error}; next attempt in {backoff.next_s:.1f} s")
-                self.ending.wait(backoff.delay_s())
+                delay_s = backoff.delay_s()
+                if self.ending.wait(delay_s):  # which returns at once from then on
+                    left_s = self._last_chance - time.monotonic()
+                    time.sleep(max(0.0, min(delay_s, left_s)))
 
     def _feed(self, session: Session, *, last: bool = False) -> None:
         """Sends what is queued at this moment."""

@@ -37,6 +37,8 @@ class StateFile:
             return None
         try:
             found = RunState(**json.loads(pathlib.Path(self._path).read_text(encoding="utf-8")))
+            if [type(value) for value in vars(found).values()] != [str, int, int]:
+                raise TypeError(f"{vars(found)} has values of other types")
         except (OSError, ValueError, TypeError) as error:
             raise refuse("session.state", f"{self._path} cannot be read: {error}; without it the "
                          "bridge begins a new run") from error

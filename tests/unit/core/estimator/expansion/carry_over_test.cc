@@ -244,7 +244,7 @@ TEST(CarryOver, BoundsAnUpdateAndGivesTheSamePosterior) {
   const Samples record = RingingRecord(kMany);
   const LeastSquares exact = FitRinging(record);
   const auto [carried, most] = TakeCounted(RingingProblem(kCheckpoint), record, kBatch);
-  const auto [replayed, most_replayed] = TakeCounted(RingingProblem(kMany), record, kBatch);
+  const auto [replayed, max_replayed] = TakeCounted(RingingProblem(kMany), record, kBatch);
   for (int i = 0; i < 2; ++i) {
     const ParameterEstimate& parameter = carried.parameters[static_cast<size_t>(i)];
     EXPECT_NEAR(parameter.map, exact.estimate[i], 1e-3 * exact.deviation[i]);
@@ -258,7 +258,7 @@ TEST(CarryOver, BoundsAnUpdateAndGivesTheSamePosterior) {
   // reads the rows since the last checkpoint, twice with the pairs of trajectories, and there are
   // at most a few in a batch.
   EXPECT_LT(most, 2 * kBatch + 4 * 2 * kCheckpoint);
-  EXPECT_GT(most_replayed, 2 * most);
+  EXPECT_GT(max_replayed, 2 * most);
 }
 
 // Filters with so little process noise that the phase tells ever more for a long time. The oracle

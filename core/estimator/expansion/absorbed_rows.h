@@ -1,0 +1,56 @@
+#pragma once
+
+// What an expansion keeps of the rows that it has absorbed.
+
+#include <cstdint>
+#include <vector>
+
+#include "core/bayes/mismatch.h"
+#include "core/bayes/window_sums.h"
+#include "core/common/types.h"
+#include "core/estimator/record/correlation_profile.h"
+#include "core/estimator/record/residual_blocks.h"
+
+namespace polyest::internal {
+
+// The accumulated contributions of the rows that an expansion has absorbed.
+struct AbsorbedRows {
+  // Starts from zero, for S terms, m channels, and Q collocation, C check and K control points.
+  AbsorbedRows(int terms, int channels, Eigen::Index points, Eigen::Index check_points,
+               int controls);
+
+  int64_t rows = 0;
+  int64_t samples = 0;            // over all channels
+  int64_t propagated = 0;         // trajectories × rows
+  std::vector<ChannelSums> sums;  // per channel, over all runs
+  WindowSums windows;             // the sums by windows of the record; none after ended runs
+  Vector discount;                // per channel: Σ ρ_k/R_k, with ρ divided by the misfit
+  double own_error = 0;           // Σ ρ_k/R_k over all channels, with ρ as it is
+  // The part of `own_error` that was taken over from an expansion over another region, and what
+  // each further sample adds to it because of the states taken over (carry_over.h).
+  double carried_error = 0;
+  double carried_rate = 0;
+  double log_noise = 0;     // Σ ½ log σ² + what outliers' weights leave out of the likelihood
+  double log_variance = 0;  // as log_noise, with R in place of σ²
+  std::vector<int64_t> outliers;  // per channel
+  // Each channel's previous sample in units of its noise; zero at the beginning of a run.
+  int summed_run = -1;
+  Matrix previous_coefficients;  // S × m
+  Vector previous_error;
+  std::vector<CorrelationProfile> profiles;  // per channel; empty unless its correlation is learned
+  std::vector<ResidualBlocks> blocks;  // per channel; since sums were carried over, if they were
+  Vector largest;  // per channel: largest |z| of the rows propagated, for relative noise
+  // Sums at the check points.
+  Matrix check_chi_squared;       // C × m
+  Vector check_residual;          // Σ ((model − expansion)/σ)²
+  std::vector<bool> check_valid;  // whether the trajectory could be integrated
+  // χ² of the model itself at the collocation points, Q × m, with the variances R of the sums; not
+  // finite where the trajectory could not be integrated. With filters, Σ log(S/σ²) is included,
+  // here and at the check points.
+  Matrix point_chi_squared;
+  Vector point_log_variance;        // Q: ½ Σ log(S/σ²) with filters, discounted; empty without
+  Matrix control_scores;            // S × (K · m), column i · m + c (control_trajectories.h)
+  std::vector<bool> control_valid;  // whether the trajectory could be integrated; K
+};
+
+}  // namespace polyest::internal
