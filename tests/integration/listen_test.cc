@@ -51,7 +51,7 @@ TEST(Listening, NamesTheAddressThatCannotBeHad) {
 }
 
 TEST(Listening, NamesAHostThatIsUnknown) {
-  DaemonProcess daemon({"--listen", "nosuchhost.invalid:5000"});
+  DaemonProcess daemon({"--insecure", "--listen", "nosuchhost.invalid:5000"});
   EXPECT_EQ(daemon.Wait(), 1);
   EXPECT_THAT(daemon.Errors(),
               testing::MatchesRegex(

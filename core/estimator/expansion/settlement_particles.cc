@@ -13,7 +13,7 @@ namespace polyest::internal {
 namespace {
 
 // Importance sampling's points: so many for each parameter, and at most.
-constexpr int kPointsPerParameter = 1024, kMaxImportancePoints = 4096;
+constexpr int kPointsPerParameter = 2048, kMaxImportancePoints = 4096;
 
 // Resamples systematically, then shuffles: the first particles become check points, and the order
 // of quasi-random points is anything but random.

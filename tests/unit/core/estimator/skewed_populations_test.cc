@@ -126,21 +126,26 @@ TEST(SkewedPopulations, OfASaturationAgreeWithTheExactPosterior) {
 
 // Two runs that say little of a steep model leave an expansion much to follow. In doubt, the wider
 // of curvature and draws counts.
-TEST(SkewedPopulations, SayHowFarTheyMayBeOff) {
+TEST(SkewedPopulations, AreRightOrSayHowFarTheyMayBeOff) {
   const Campaign campaign(
       "exp(2*v)", [](double v) { return std::exp(2 * v); }, 1, 2, 1);
   const Estimate estimate = EstimateOf(campaign.MakeProblem(), campaign.samples);
   const GridOracle exact(campaign);
-  EXPECT_THAT(InaccuracyOf(estimate), ContainsRegex("estimates may be off by (up to )?0\\."));
-  const bool of_several = InaccuracyOf(estimate).find(" % of the posterior") != std::string::npos;
+  const std::string inaccuracy = InaccuracyOf(estimate);
+  // Rounding decides whether the expansion follows well enough to need no warning.
+  if (!inaccuracy.empty()) {
+    EXPECT_THAT(inaccuracy, ContainsRegex("estimates may be off by (up to )?0\\."));
+  }
+  const double allowed = inaccuracy.empty() ? 0.1 : 0.4;  // standard deviations
+  const bool of_several = inaccuracy.find(" % of the posterior") != std::string::npos;
   for (const ParameterEstimate& parameter : estimate.parameters) {
     if (!of_several) break;  // By rounding there may be one component.
     EXPECT_GE(parameter.std_dev, (1 - 1e-12) * parameter.posterior_std_dev) << parameter.name;
   }
   EXPECT_NEAR(ParameterOf(estimate, "v.mean").mean, exact.mean.mean(),
-              0.4 * exact.mean.deviation());
+              allowed * exact.mean.deviation());
   EXPECT_NEAR(ParameterOf(estimate, "v.spread").mean, exact.spread.mean(),
-              0.4 * exact.spread.deviation());
+              allowed * exact.spread.deviation());
 }
 
 }  // namespace

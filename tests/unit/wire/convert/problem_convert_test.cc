@@ -240,7 +240,7 @@ TEST(ToProblem, NamesThePlaceOfABadPrior) {
             "uncertain[0].uniform: lower 5 must be below upper 3");
   EXPECT_THAT(MessageWith(R"({"uncertain": [{"name": "v0", "uniform": {"lower": 0, "upper": 1}},
                                             {"name": "c", "normal": {"mean": 1}}]})"),
-              StartsWith("uncertain[1].normal: "));
+              StartsWith("uncertain[1].normal.stdDev: "));
   EXPECT_THAT(MessageWith(R"({"uncertain": [{"name": "v0", "beta": {"alpha": 0.5, "beta": 2,
                                              "lower": 0, "upper": 1}}]})"),
               StartsWith("uncertain[0].beta: alpha 0.5"));
