@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "core/common/status.h"
+#include "core/estimator/expansion/likelihood_power.h"
 
 namespace polyest::internal {
 namespace {
@@ -28,27 +29,41 @@ bool SecondSearch::IsDue(const Problem& problem, double misfit) const {
 absl::Status SecondSearch::Look(const ResolvedProblem& problem, const SampleStore* store,
                                 int threads, const Stop& stop,
                                 std::unique_ptr<ComponentMixture>& mixture) {
-  const double misfit = mixture->Misfit();
-  if (IsDue(problem.problem(), misfit)) {
-    if (!second_) {
-      std::optional<ResolvedProblem> first_run;
-      if (problem.runs() > 1) {
-        POLYEST_ASSIGN_OR_RETURN(first_run, problem.WithRuns(1));
-      }
-      POLYEST_ASSIGN_OR_RETURN(
-          second_, ComponentMixture::OfPrior(first_run ? *first_run : problem, store, threads,
-                                             {.misfit = misfit, .rows = state_.row}, stop));
+  if (second_ || IsDue(problem.problem(), mixture->Misfit())) {
+    POLYEST_ASSIGN_OR_RETURN(bool better, IsBetter(problem, store, threads, stop, mixture));
+    if (!better && !in_tails_ && problem.dimension() <= kFewDimensions) {
+      in_tails_ = true;
+      POLYEST_ASSIGN_OR_RETURN(better, IsBetter(problem, store, threads, stop, mixture));
     }
-    const absl::Status taken = second_->TakeUpTo(state_.row, stop);
-    if (!taken.ok() && !absl::IsFailedPrecondition(taken)) return taken;
-    if (taken.ok() && second_->Misfit() < kBetter * misfit) std::swap(mixture, second_);
-    mixture->AddWorkOf(*second_);
-    second_.reset();
+    in_tails_ = false;
     state_.tried_row = state_.row;
     state_.tried_misfit = mixture->Misfit();
   }
   state_.row = NextWindow(state_.row);
   return absl::OkStatus();
+}
+
+absl::StatusOr<bool> SecondSearch::IsBetter(const ResolvedProblem& problem,
+                                            const SampleStore* store, int threads, const Stop& stop,
+                                            std::unique_ptr<ComponentMixture>& mixture) {
+  const double misfit = mixture->Misfit();
+  if (!second_) {
+    std::optional<ResolvedProblem> first_run;
+    if (problem.runs() > 1) {
+      POLYEST_ASSIGN_OR_RETURN(first_run, problem.WithRuns(1));
+    }
+    POLYEST_ASSIGN_OR_RETURN(
+        second_, ComponentMixture::OfPrior(
+                     first_run ? *first_run : problem, store, threads,
+                     {.misfit = misfit, .rows = state_.row, .in_tails = in_tails_}, stop));
+  }
+  const absl::Status taken = second_->TakeUpTo(state_.row, stop);
+  if (!taken.ok() && !absl::IsFailedPrecondition(taken)) return taken;
+  const bool better = taken.ok() && second_->Misfit() < kBetter * misfit;
+  if (better) std::swap(mixture, second_);
+  mixture->AddWorkOf(*second_);
+  second_.reset();
+  return better;
 }
 
 }  // namespace polyest::internal

@@ -6,8 +6,9 @@
 // nothing of places far away. Such residuals are therefore first suspected of being that. A second
 // mixture begins at the prior, with the likelihood tempered by the misfit until it has taken the
 // rows so far, so that nothing contracts about a wrong place, and with the tempering then withdrawn
-// step by step. It replaces the first one if its misfit is clearly smaller. Only what remains is
-// MODEL_MISFIT.
+// step by step. It replaces the first one if its misfit is clearly smaller. If it does not, and the
+// parameters are few, a further one begins on an expansion over the prior's tails, where the
+// prior's own polynomials follow no model. Only what remains is MODEL_MISFIT.
 //
 // The looks are at rows that are a function of the record alone. After a search that found nothing,
 // the next one waits until the record is four times as long or the misfit four times as large, so
@@ -33,7 +34,7 @@ class SecondSearch {
                     const Stop& stop, std::unique_ptr<ComponentMixture>& mixture);
 
   struct State {
-    int64_t row = 8;          // of the next look
+    int64_t row = 4;          // of the next look
     int64_t tried_row = 0;    // of the last search that found nothing
     double tried_misfit = 0;  // there
 
@@ -47,9 +48,14 @@ class SecondSearch {
 
  private:
   bool IsDue(const Problem& problem, double misfit) const;
+  // Searches once, and returns whether the mixture was replaced.
+  absl::StatusOr<bool> IsBetter(const ResolvedProblem& problem, const SampleStore* store,
+                                int threads, const Stop& stop,
+                                std::unique_ptr<ComponentMixture>& mixture);
 
   State state_;
   std::unique_ptr<ComponentMixture> second_;  // during a search
+  bool in_tails_ = false;                     // whether it is over the prior's tails
 };
 
 }  // namespace polyest::internal

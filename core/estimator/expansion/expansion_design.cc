@@ -15,6 +15,7 @@ namespace polyest::internal {
 namespace {
 
 constexpr double kTrustedProbability = 1e-3;  // omitted in each tail of an unbounded germ
+constexpr double kFarTail = 1e-6;             // omitted in each tail of a germ, where tails matter
 constexpr double kMargin = 1.35;              // widening of a region beyond its particles
 constexpr double kMinHalfWidth = 1e-10;       // minimum for a region, in germ units
 constexpr double kBeyond = 1.12;  // factor of the half width at which Ω is checked beyond an edge
@@ -127,6 +128,22 @@ void SpreadCheckPoints(const ResolvedProblem& problem, const Vector& inside,
   design.check_points = 2 * sequence.bottomRows(checks).array() - 1;
   MoveInside(problem.prior(), design.region, inside, design.check_points);
   design.check_costs = Vector::Zero(checks);
+}
+
+ExpansionDesign DesignForTails(const ResolvedProblem& problem) {
+  const int n = problem.dimension();
+  Vector lower(n), upper(n), mean(n);
+  for (int j = 0; j < n; ++j) {
+    const Germ& germ = problem.prior().germs()[static_cast<size_t>(j)];
+    lower[j] = germ.Quantile(kFarTail);
+    upper[j] = germ.Quantile(1 - kFarTail);
+    mean[j] = germ.Mean();
+  }
+  const Vector half = 0.5 * (upper - lower);
+  ExpansionDesign design = DesignForRegion(problem, FirstTruncation(problem.problem().expansion, n),
+                                           Region(0.5 * (lower + upper), half.asDiagonal()), mean);
+  SpreadCheckPoints(problem, mean, design);
+  return design;
 }
 
 Vector NearestInside(const Prior& prior, const Vector& xi) {

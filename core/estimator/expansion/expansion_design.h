@@ -55,6 +55,9 @@ std::pair<double, double> TrustedRange(const Germ& germ);
 // germs' quantile functions. Returns FailedPrecondition or ResourceExhausted if the collocation
 // points cannot be made.
 absl::StatusOr<ExpansionDesign> DesignForPrior(const ResolvedProblem& problem);
+// Returns the design of an expansion over the prior and its tails, to the 10⁻⁶ quantiles: Legendre
+// polynomials, which follow the model there as well as where the prior is dense.
+ExpansionDesign DesignForTails(const ResolvedProblem& problem);
 
 // Returns a design over `region`, η ∈ [−1, 1]^n. Collocation points outside Ω are moved towards
 // `inside`, a point of Ω in germ coordinates, until they lie in Ω. The design has no check points.

@@ -61,7 +61,12 @@ absl::StatusOr<std::unique_ptr<MixtureComponent>> MixtureComponent::OfPrior(
     const ResolvedProblem& problem, const SampleStore* store, int threads,
     const TemperedBeginning& beginning, const Stop& stop) {
   std::unique_ptr<MixtureComponent> component(new MixtureComponent(problem, store, threads));
-  POLYEST_ASSIGN_OR_RETURN(ExpansionDesign design, DesignForPrior(component->problem_));
+  ExpansionDesign design;
+  if (beginning.in_tails) {
+    design = DesignForTails(component->problem_);
+  } else {
+    POLYEST_ASSIGN_OR_RETURN(design, DesignForPrior(component->problem_));
+  }
   LearnedNoise noise = NoiseToBeginWith(problem.problem());
   noise.misfit = beginning.misfit;
   component->tempered_ = beginning;

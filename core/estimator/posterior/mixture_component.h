@@ -35,8 +35,9 @@ struct ComponentState;
 
 // A beginning at the prior with the likelihood tempered.
 struct TemperedBeginning {
-  double misfit = 1;  // ≥ 1, by which the cost is divided at least
-  int64_t rows = 0;   // until so many rows have been taken; it then falls to 1 step by step
+  double misfit = 1;      // ≥ 1, by which the cost is divided at least
+  int64_t rows = 0;       // until so many rows have been taken; it then falls to 1 step by step
+  bool in_tails = false;  // whether the expansion is over the prior's tails, too
 };
 
 class MixtureComponent {
