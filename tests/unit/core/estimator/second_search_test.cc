@@ -59,6 +59,28 @@ TEST(SecondSearch, LeavesAFalseMinimum) {
   }
 }
 
+// Frequencies that the prior holds for improbable, 2.7 to 3.9 of its standard deviations from its
+// mean in units of normal scores: its own polynomials do not follow the model there. Eight samples
+// of half a period or more leave no doubt; the truth is the oracle.
+TEST(SecondSearch, FindsWhatIsInThePriorsTails) {
+  const Problem problem =
+      TextProblem("cos(w*t)", {*UncertainParameter::Beta("w", 2, 40, 0, 100)}, kNoise / 2);
+  for (const double frequency : {18.0, 21.0, 24.0, 28.0}) {
+    Samples samples;
+    samples.columns = {{"y", {}, {}}};
+    for (int k = 1; k <= 8; ++k) {
+      samples.time_s.push_back(0.05 * k);
+      const double error = (k % 3 - 1) * kNoise / 2;
+      samples.columns[0].value.push_back(std::cos(frequency * 0.05 * k) + error);
+    }
+    const Estimate estimate = EstimateOf(problem, samples);
+    const ParameterEstimate& w = estimate.parameters[0];
+    EXPECT_NEAR(w.map, frequency, 4 * w.std_dev) << frequency;
+    EXPECT_LT(w.std_dev, 0.2) << frequency;
+    EXPECT_FALSE(Has(estimate, DiagnosticCode::kModelMisfit)) << frequency;
+  }
+}
+
 // Where nothing better is to be found, the misfit stays and is said.
 TEST(SecondSearch, KeepsWhatItCannotBetter) {
   Samples samples;
