@@ -4,9 +4,9 @@
     estimates_benchmark.py POLYEST [OTHER_POLYEST]... [--repeats N] [--only NAME]... [--data FOLDER]
 
 Prints for each record the CPU time on one thread, beside that of a start of the program, and the runs of
-the model: of each build its fastest of N estimates (or of a
-second's), then how often the first build's time goes into each
-other one's. Records of real hardware that the folder does not hold are left out.
+the model, for each build: the least of N estimates, or of as many as take a second. Then it prints how
+many times as fast the first build is as each other one. Records of real hardware that the folder does not
+hold are left out.
 """
 
 import argparse
@@ -16,6 +16,7 @@ import math
 import pathlib
 import random
 import resource
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -164,13 +165,16 @@ def measure(builds, problem, record, repeats):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n", maxsplit=1)[0])
     parser.add_argument("builds", nargs="+", metavar="POLYEST")
-    parser.add_argument("--repeats", type=int, default=5, help="of each estimate, ≥ 1 (5)")
+    parser.add_argument("--repeats", type=int, default=5, help="estimates of each record, ≥ 1 (5)")
     parser.add_argument("--only", action="append", choices=RECORDS, help="this record; may be repeated")
     parser.add_argument("--data", type=pathlib.Path, default=DATA,
                         help="the folder of measured records (../shared/data)")
     arguments = parser.parse_args()
     if arguments.repeats < 1:
         parser.error(f"--repeats is {arguments.repeats}, but must be at least 1")
+    for build in arguments.builds:
+        if shutil.which(build) is None:
+            parser.error(f"{build} is no program")
     print(f"{'record':40}{'CPU s, and model runs, of each build':>38}")
     for name in arguments.only or RECORDS:
         size, files = RECORDS[name]

@@ -11,6 +11,7 @@ import argparse
 import collections
 import pathlib
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -95,6 +96,8 @@ def main():
     parser.add_argument("--data", type=pathlib.Path, default=DATA,
                         help="the folder of measured records (../shared/data)")
     arguments = parser.parse_args()
+    if shutil.which(arguments.polyest) is None:
+        parser.error(f"{arguments.polyest} is no program")
     arguments.folder.mkdir(parents=True, exist_ok=True)
     for name in arguments.only or slowest(arguments.polyest, arguments.data):
         draw(arguments.polyest, name, arguments.data, arguments.folder)
