@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "core/common/status.h"
+#include "core/estimator/expansion/expansion_design.h"
 #include "core/estimator/expansion/likelihood_power.h"
 
 namespace polyest::internal {
@@ -31,7 +32,8 @@ absl::Status SecondSearch::Look(const ResolvedProblem& problem, const SampleStor
                                 std::unique_ptr<ComponentMixture>& mixture) {
   if (second_ || IsDue(problem.problem(), mixture->Misfit())) {
     POLYEST_ASSIGN_OR_RETURN(bool better, IsBetter(problem, store, threads, stop, mixture));
-    if (!better && !in_tails_ && problem.dimension() <= kFewDimensions) {
+    const bool few = problem.dimension() <= kFewDimensions && !BeginsInTails(problem);
+    if (!better && !in_tails_ && few) {
       in_tails_ = true;
       POLYEST_ASSIGN_OR_RETURN(better, IsBetter(problem, store, threads, stop, mixture));
     }

@@ -122,6 +122,7 @@ template <class Archive>
 void serialize(Archive& archive, DesignState& design) {
   archive(design.truncation.order, design.truncation.exponent);
   Flag(archive, design.whole_prior);
+  Flag(archive, design.in_tails);
   Flag(archive, design.checks_are_draws);
   archive(design.centre, design.axes, design.points, design.check_points, design.check_costs,
           design.reference, design.lower, design.upper, design.element);

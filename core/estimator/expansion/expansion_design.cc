@@ -6,6 +6,7 @@
 
 #include "core/bayes/domain_cover.h"
 #include "core/chaos/collocation_points.h"
+#include "core/chaos/gauss_rule.h"
 #include "core/common/check.h"
 #include "core/common/linear_algebra.h"
 #include "core/common/status.h"
@@ -16,6 +17,7 @@ namespace {
 
 constexpr double kTrustedProbability = 1e-3;  // omitted in each tail of an unbounded germ
 constexpr double kFarTail = 1e-6;             // omitted in each tail of a germ, where tails matter
+constexpr int kFewForTails = 1;               // parameters
 constexpr double kMargin = 1.35;              // widening of a region beyond its particles
 constexpr double kMinHalfWidth = 1e-10;       // minimum for a region, in germ units
 constexpr double kBeyond = 1.12;  // factor of the half width at which Ω is checked beyond an edge
@@ -143,7 +145,46 @@ ExpansionDesign DesignForTails(const ResolvedProblem& problem) {
   ExpansionDesign design = DesignForRegion(problem, FirstTruncation(problem.problem().expansion, n),
                                            Region(0.5 * (lower + upper), half.asDiagonal()), mean);
   SpreadCheckPoints(problem, mean, design);
+  design.in_tails = true;
   return design;
+}
+
+bool BeginsInTails(const ResolvedProblem& problem) {
+  const std::vector<Germ>& germs = problem.prior().germs();
+  return problem.problem().expansion.adaptive && problem.dimension() <= kFewForTails &&
+         std::ranges::any_of(germs, [](const Germ& germ) { return germ != Germ::Uniform(); });
+}
+
+absl::StatusOr<ExpansionDesign> DesignToBeginWith(const ResolvedProblem& problem) {
+  if (BeginsInTails(problem)) return DesignForTails(problem);
+  return DesignForPrior(problem);
+}
+
+PriorMoments MomentsUnderPrior(const Prior& prior, const ExpansionDesign& design) {
+  // Gauss's rules with p + 1 nodes for each germ integrate products of polynomials of degree p.
+  const int n = prior.dimension(), nodes = design.basis->order() + 1, size = design.basis->size();
+  std::vector<GaussRule> rules;
+  Eigen::Index count = 1;
+  for (const Germ& germ : prior.germs()) {
+    rules.push_back(MakeGaussRule(germ, nodes));
+    count *= nodes;
+  }
+  PriorMoments moments{Vector::Zero(size), Matrix::Zero(size, size)};
+  Vector xi(n), phi(size);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    double weight = 1;
+    Eigen::Index place = i;
+    for (int j = 0; j < n; ++j, place /= nodes) {
+      const GaussRule& rule = rules[static_cast<size_t>(j)];
+      xi[j] = rule.nodes[place % nodes];
+      weight *= rule.weights[place % nodes];
+    }
+    design.basis->Evaluate(design.region.ToLocal(xi), phi);
+    moments.mean += weight * phi;
+    moments.covariance += weight * phi * phi.transpose();
+  }
+  moments.covariance -= moments.mean * moments.mean.transpose();
+  return moments;
 }
 
 Vector NearestInside(const Prior& prior, const Vector& xi) {

@@ -30,10 +30,11 @@ struct ExpansionDesign {
   // Whether the check points are draws of a posterior. Those that cover the prior or the region are
   // too few to speak for a posterior that is much narrower.
   bool checks_are_draws = false;
-  Vector reference;     // η_0, the reference of the mismatch sums
-  Vector lower, upper;  // the trusted box (n), local coordinates
-  bool whole_prior = true;
-  Element element;  // the part of Ω whose posterior this expansion represents
+  Vector reference;         // η_0, the reference of the mismatch sums
+  Vector lower, upper;      // the trusted box (n), local coordinates
+  bool whole_prior = true;  // whether the basis is orthonormal with the prior as weight
+  bool in_tails = false;    // whether it is that of DesignForTails
+  Element element;          // the part of Ω whose posterior this expansion represents
 };
 
 // Fraction of the trusted box beyond which a particle counts as lying at its edge, and how far
@@ -58,6 +59,18 @@ absl::StatusOr<ExpansionDesign> DesignForPrior(const ResolvedProblem& problem);
 // Returns the design of an expansion over the prior and its tails, to the 10⁻⁶ quantiles: Legendre
 // polynomials, which follow the model there as well as where the prior is dense.
 ExpansionDesign DesignForTails(const ResolvedProblem& problem);
+// Whether estimates begin with DesignForTails: those of a single parameter that is not uniform,
+// where that costs little and no mode of the posterior in the prior's tails is lost.
+bool BeginsInTails(const ResolvedProblem& problem);
+// Returns the design with which estimates begin, DesignForTails or DesignForPrior.
+absl::StatusOr<ExpansionDesign> DesignToBeginWith(const ResolvedProblem& problem);
+// The mean and the covariance of the basis' polynomials under the prior, S and S × S.
+struct PriorMoments {
+  Vector mean;
+  Matrix covariance;
+};
+// Returns them for a design in the tails, whose basis is not orthonormal there.
+PriorMoments MomentsUnderPrior(const Prior& prior, const ExpansionDesign& design);
 
 // Returns a design over `region`, η ∈ [−1, 1]^n. Collocation points outside Ω are moved towards
 // `inside`, a point of Ω in germ coordinates, until they lie in Ω. The design has no check points.

@@ -128,17 +128,10 @@ absl::Status Inconsistent(const char* what) {
 }  // namespace
 
 DesignState StateOf(const ExpansionDesign& design) {
-  return {design.basis->truncation(),
-          design.whole_prior,
-          design.region.centre(),
-          design.region.axes(),
-          design.points,
-          design.check_points,
-          design.check_costs,
-          design.checks_are_draws,
-          design.reference,
-          design.lower,
-          design.upper,
+  return {design.basis->truncation(), design.whole_prior,   design.in_tails,
+          design.region.centre(),     design.region.axes(), design.points,
+          design.check_points,        design.check_costs,   design.checks_are_draws,
+          design.reference,           design.lower,         design.upper,
           design.element.bounds()};
 }
 
@@ -158,6 +151,7 @@ absl::StatusOr<ExpansionDesign> DesignOf(const ResolvedProblem& problem, DesignS
   design.lower = std::move(state.lower);
   design.upper = std::move(state.upper);
   design.whole_prior = state.whole_prior;
+  design.in_tails = state.in_tails;
   design.element = Element(std::move(state.element));
   return design;
 }

@@ -17,6 +17,7 @@ namespace polyest::internal {
 struct DesignState {
   Truncation truncation;
   bool whole_prior = true;
+  bool in_tails = false;
   Vector centre;
   Matrix axes;
   Matrix points, check_points;

@@ -59,7 +59,7 @@ void AddCheckPoints(const ResolvedProblem& grown, const ExpansionDesign& present
 
 absl::StatusOr<ExpansionDesign> DesignForNewRuns(const ResolvedProblem& grown,
                                                  const ExpansionDesign& present) {
-  if (present.whole_prior) return DesignForPrior(grown);
+  if (present.whole_prior || present.in_tails) return DesignToBeginWith(grown);
   const Eigen::Index known = present.region.dimension();
   POLYEST_CHECK(known <= grown.dimension());
   Region region = RegionWith(TrustedRegion(present), NewGerms(grown, known));

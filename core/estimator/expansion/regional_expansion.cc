@@ -79,6 +79,7 @@ RegionalExpansion::RegionalExpansion(const ResolvedProblem& problem, const Sampl
   POLYEST_CHECK(static_cast<int>(noise_.channels.size()) == channels_);
   std::iota(kept_.begin(), kept_.end(), 0);
   design_.basis->Evaluate(design_.reference, reference_phi_);
+  if (design_.in_tails) prior_moments_ = MomentsUnderPrior(problem_.prior(), design_);
   design_.basis->EvaluateMany(design_.check_points, check_phi_);
   check_basis_ = PackedMatrix(check_phi_);
   for (int c = 0; c < channels_; ++c) {
@@ -256,15 +257,20 @@ Vector RegionalExpansion::TermWeights() const {
 // (12).
 std::optional<PriorPrediction> RegionalExpansion::PredictionOf(int row, int channel) const {
   const double sigma = block_.noise[static_cast<size_t>(row * channels_ + channel)];
-  if (!design_.whole_prior || sigma <= 0) return std::nullopt;
+  if (!(design_.whole_prior || design_.in_tails) || sigma <= 0) return std::nullopt;
   const size_t width = block_.values.size() / block_.rows.size();
   const int column = row * channels_ + channel;
   const auto coefficients = coefficients_.col(column);
   PriorPrediction prediction;
   prediction.value = block_.values[static_cast<size_t>(row) * width + static_cast<size_t>(channel)];
-  prediction.mean = coefficients[0];
-  prediction.variance =
-      coefficients.tail(coefficients.size() - 1).squaredNorm() + residual_variance_[column];
+  if (design_.in_tails) {
+    prediction.mean = coefficients.dot(prior_moments_.mean);
+    prediction.variance = coefficients.dot(prior_moments_.covariance * coefficients);
+  } else {
+    prediction.mean = coefficients[0];
+    prediction.variance = coefficients.tail(coefficients.size() - 1).squaredNorm();
+  }
+  prediction.variance += residual_variance_[column];
   prediction.noise = sigma;
   if (!std::isfinite(prediction.variance) || !std::isfinite(prediction.mean)) return std::nullopt;
   return prediction;

@@ -242,6 +242,7 @@ class RegionalExpansion {
   const ResolvedProblem& problem_;
   const SampleStore* store_;
   ExpansionDesign design_;
+  PriorMoments prior_moments_;  // empty unless the design is in the prior's tails
   LearnedNoise noise_;
   CollocationMatrix matrix_;
   int threads_;

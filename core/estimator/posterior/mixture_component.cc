@@ -65,7 +65,7 @@ absl::StatusOr<std::unique_ptr<MixtureComponent>> MixtureComponent::OfPrior(
   if (beginning.in_tails) {
     design = DesignForTails(component->problem_);
   } else {
-    POLYEST_ASSIGN_OR_RETURN(design, DesignForPrior(component->problem_));
+    POLYEST_ASSIGN_OR_RETURN(design, DesignToBeginWith(component->problem_));
   }
   LearnedNoise noise = NoiseToBeginWith(problem.problem());
   noise.misfit = beginning.misfit;
