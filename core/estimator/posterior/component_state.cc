@@ -1,9 +1,11 @@
 #include "core/estimator/posterior/component_state.h"
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "core/common/check.h"
 #include "core/common/status.h"
@@ -47,6 +49,19 @@ bool IsStateFor(const ResolvedProblem& problem, const ComponentState& state) {
          state.weight <= 1 && state.room >= 1 &&
          IsSummaryFor(problem, state.summary, state.taken) &&
          ReplayAllowance::IsState(state.allowance, state.taken);
+}
+
+// Whether the rows at which the summary says that the record begins are those of the store.
+absl::StatusOr<bool> BeginsAs(const RecordSummary& summary, const SampleStore& store) {
+  const std::vector<SampleRow>& rows = summary.beginning().rows;
+  const auto count = std::ssize(rows);
+  if (count == 0) return true;
+  if (count > store.rows()) return false;
+  RowBlock block;
+  POLYEST_RETURN_IF_ERROR(store.Read(0, count, block));
+  return std::ranges::equal(rows, block.rows, [](const SampleRow& a, const SampleRow& b) {
+    return a.run == b.run && a.time_s == b.time_s;
+  });
 }
 
 // Whether the ended runs have the windows that they must have.
@@ -129,6 +144,10 @@ absl::StatusOr<std::unique_ptr<MixtureComponent>> MixtureComponent::FromState(
   POLYEST_ASSIGN_OR_RETURN(const ResolvedProblem own, ProblemOf(problem, state));
   if (!IsStateFor(own, state)) {
     return absl::DataLossError("the snapshot's windows or particles cannot be of this problem");
+  }
+  POLYEST_ASSIGN_OR_RETURN(const bool same_rows, BeginsAs(state.summary, *store));
+  if (!same_rows) {
+    return absl::FailedPreconditionError("the rows appended are not those of the snapshot");
   }
   std::unique_ptr<MixtureComponent> component(new MixtureComponent(own, store, threads));
   POLYEST_ASSIGN_OR_RETURN(
