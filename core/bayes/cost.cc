@@ -98,7 +98,7 @@ CostValue Cost::EvaluateWithGradient(const ConstVectorRef& eta, VectorRef gradie
   return value;
 }
 
-// Returns the Hessian of β J_mismatch, or of β (J_mismatch + J_0).
+// Returns the Hessian of β J_mismatch or, with the remainder J_0, of β (J_mismatch + J_0).
 Matrix Cost::HessianOfData(const ConstVectorRef& eta, double spent, bool with_remainder) const {
   Vector d(basis_->size());
   Matrix phi_gradient(basis_->size(), dimension());
@@ -114,7 +114,7 @@ Matrix Cost::HessianOfData(const ConstVectorRef& eta, double spent, bool with_re
   return 0.5 * power_ * (hessian + hessian.transpose());
 }
 
-// Adds that of a population.
+// Adds the Hessian of J_P, where there is a population.
 void Cost::AddPopulation(const ConstVectorRef& eta, Matrix& hessian) const {
   if (population_ == nullptr) return;
   const Matrix of_population = population_->Differentiate(region_.ToGerm(eta), power_).hessian;

@@ -31,11 +31,11 @@ absl::Status SecondSearch::Look(const ResolvedProblem& problem, const SampleStor
                                 int threads, const Stop& stop,
                                 std::unique_ptr<ComponentMixture>& mixture) {
   if (second_ || IsDue(problem.problem(), mixture->Misfit())) {
-    POLYEST_ASSIGN_OR_RETURN(bool better, IsBetter(problem, store, threads, stop, mixture));
+    POLYEST_ASSIGN_OR_RETURN(bool better, Search(problem, store, threads, stop, mixture));
     const bool few = problem.dimension() <= kFewDimensions && !BeginsInTails(problem);
     if (!better && !in_tails_ && few) {
       in_tails_ = true;
-      POLYEST_ASSIGN_OR_RETURN(better, IsBetter(problem, store, threads, stop, mixture));
+      POLYEST_ASSIGN_OR_RETURN(better, Search(problem, store, threads, stop, mixture));
     }
     in_tails_ = false;
     state_.tried_row = state_.row;
@@ -45,9 +45,9 @@ absl::Status SecondSearch::Look(const ResolvedProblem& problem, const SampleStor
   return absl::OkStatus();
 }
 
-absl::StatusOr<bool> SecondSearch::IsBetter(const ResolvedProblem& problem,
-                                            const SampleStore* store, int threads, const Stop& stop,
-                                            std::unique_ptr<ComponentMixture>& mixture) {
+absl::StatusOr<bool> SecondSearch::Search(const ResolvedProblem& problem, const SampleStore* store,
+                                          int threads, const Stop& stop,
+                                          std::unique_ptr<ComponentMixture>& mixture) {
   const double misfit = mixture->Misfit();
   if (!second_) {
     std::optional<ResolvedProblem> first_run;

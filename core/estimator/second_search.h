@@ -49,9 +49,8 @@ class SecondSearch {
  private:
   bool IsDue(const Problem& problem, double misfit) const;
   // Searches once, and returns whether the mixture was replaced.
-  absl::StatusOr<bool> IsBetter(const ResolvedProblem& problem, const SampleStore* store,
-                                int threads, const Stop& stop,
-                                std::unique_ptr<ComponentMixture>& mixture);
+  absl::StatusOr<bool> Search(const ResolvedProblem& problem, const SampleStore* store, int threads,
+                              const Stop& stop, std::unique_ptr<ComponentMixture>& mixture);
 
   State state_;
   std::unique_ptr<ComponentMixture> second_;  // during a search

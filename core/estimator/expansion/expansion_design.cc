@@ -155,8 +155,8 @@ bool BeginsInTails(const ResolvedProblem& problem) {
          std::ranges::any_of(germs, [](const Germ& germ) { return germ != Germ::Uniform(); });
 }
 
-absl::StatusOr<ExpansionDesign> DesignToBeginWith(const ResolvedProblem& problem) {
-  if (BeginsInTails(problem)) return DesignForTails(problem);
+absl::StatusOr<ExpansionDesign> DesignToBeginWith(const ResolvedProblem& problem, bool in_tails) {
+  if (in_tails || BeginsInTails(problem)) return DesignForTails(problem);
   return DesignForPrior(problem);
 }
 

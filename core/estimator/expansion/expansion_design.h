@@ -62,8 +62,10 @@ ExpansionDesign DesignForTails(const ResolvedProblem& problem);
 // Whether estimates begin with DesignForTails: those of a single parameter that is not uniform,
 // where that costs little and no mode of the posterior in the prior's tails is lost.
 bool BeginsInTails(const ResolvedProblem& problem);
-// Returns the design with which estimates begin, DesignForTails or DesignForPrior.
-absl::StatusOr<ExpansionDesign> DesignToBeginWith(const ResolvedProblem& problem);
+// Returns the design with which estimates begin: DesignForTails where they do so, or where
+// `in_tails` asks for it, else DesignForPrior.
+absl::StatusOr<ExpansionDesign> DesignToBeginWith(const ResolvedProblem& problem,
+                                                  bool in_tails = false);
 // The mean and the covariance of the basis' polynomials under the prior, S and S × S.
 struct PriorMoments {
   Vector mean;

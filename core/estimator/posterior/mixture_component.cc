@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <optional>
 #include <utility>
 
 #include "core/common/status.h"
@@ -61,12 +59,8 @@ absl::StatusOr<std::unique_ptr<MixtureComponent>> MixtureComponent::OfPrior(
     const ResolvedProblem& problem, const SampleStore* store, int threads,
     const TemperedBeginning& beginning, const Stop& stop) {
   std::unique_ptr<MixtureComponent> component(new MixtureComponent(problem, store, threads));
-  ExpansionDesign design;
-  if (beginning.in_tails) {
-    design = DesignForTails(component->problem_);
-  } else {
-    POLYEST_ASSIGN_OR_RETURN(design, DesignToBeginWith(component->problem_));
-  }
+  POLYEST_ASSIGN_OR_RETURN(ExpansionDesign design,
+                           DesignToBeginWith(component->problem_, beginning.in_tails));
   LearnedNoise noise = NoiseToBeginWith(problem.problem());
   noise.misfit = beginning.misfit;
   component->tempered_ = beginning;

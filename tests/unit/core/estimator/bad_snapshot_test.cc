@@ -153,6 +153,23 @@ TEST_F(BadSnapshot, IsOneOfAnotherProblem) {
   EXPECT_TRUE(refused([](Problem& p) { p.derived = {{"v0", "0 * k"}}; }));
 }
 
+// What a snapshot says of the record's beginning is computed with: times that go back would end it.
+TEST_F(BadSnapshot, BeginsAtOtherTimesThanTheRows) {
+  const uint32_t fingerprint = FingerprintOf(problem_);
+  Samples stretched = samples_;
+  for (double& time_s : stretched.time_s) time_s *= 1.5;
+  Session session(problem_);
+  session.Take(stretched);
+  EstimatorState state = DecodeState(good_.state, good_.rows, fingerprint).value();
+  const EstimatorState other =
+      DecodeState(session.last.state, session.last.rows, fingerprint).value();
+  ASSERT_EQ(session.last.rows, good_.rows);
+  state.mixture.components.front().summary = other.mixture.components.front().summary;
+  const absl::Status status = Restored(EncodeState(state, good_.rows, fingerprint));
+  EXPECT_TRUE(absl::IsFailedPrecondition(status)) << status;
+  EXPECT_THAT(status.message(), HasSubstr("not those of the snapshot"));
+}
+
 // The description of a model, with another identity.
 class OtherFile final : public Model {
  public:

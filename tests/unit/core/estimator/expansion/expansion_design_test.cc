@@ -75,6 +75,25 @@ TEST(DesignForPrior, TrustsAnUnboundedGermBetweenItsOuterThousandths) {
   EXPECT_NEAR((1 + design.upper[1]) * std::exp(-design.upper[1]), 0.001, 1e-9);
 }
 
+// The oracle: with v0 = h η, h = −Φ⁻¹(10⁻⁶), the normalized Legendre polynomials √3 η and
+// √5 (3 η² − 1)/2 have these moments, since E[v0²] = 1 and E[v0⁴] = 3.
+TEST(DesignForTails, KnowsTheMomentsOfItsPolynomialsUnderThePrior) {
+  const ResolvedProblem problem = ProblemWith({UncertainParameter::Normal("v0", 0, 1).value()}, 2);
+  EXPECT_TRUE(BeginsInTails(problem));
+  EXPECT_FALSE(BeginsInTails(TwoUniforms()));
+  const ExpansionDesign design = DesignToBeginWith(problem).value();
+  EXPECT_TRUE(design.in_tails);
+  const double h = 4.753424308822899, square = 1 / (h * h);
+  constexpr double kOfBound = 1e-10;  // 1 − 10⁻⁶ is rounded by 1e-16, its quantile by 2e-11
+  const PriorMoments moments = MomentsUnderPrior(problem.prior(), design);
+  EXPECT_NEAR(moments.mean[0], 1, 1e-12);
+  EXPECT_NEAR(moments.mean[1], 0, kOfBound);
+  EXPECT_NEAR(moments.mean[2], std::sqrt(5) / 2 * (3 * square - 1), kOfBound);
+  EXPECT_NEAR(moments.covariance(0, 0), 0, 1e-12);
+  EXPECT_NEAR(moments.covariance(1, 1), 3 * square, kOfBound);
+  EXPECT_NEAR(moments.covariance(2, 2), 5.0 / 4 * 9 * (3 - 1) * square * square, kOfBound);
+}
+
 TEST(DesignForPrior, ChecksAtPointsThatAreNotCollocationPoints) {
   const ExpansionDesign design = DesignForPrior(TwoUniforms()).value();
   ASSERT_GT(design.check_points.rows(), 0);
