@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kTrustedProbability = 1e-3;  // omitted in each tail of an unbounded germ
 constexpr double kFarTail = 1e-6;             // omitted in each tail of a germ, where tails matter
-constexpr int kFewForTails = 1;               // parameters
+constexpr int kFewForTails = 2;               // parameters
 constexpr double kMargin = 1.35;              // widening of a region beyond its particles
 constexpr double kMinHalfWidth = 1e-10;       // minimum for a region, in germ units
 constexpr double kBeyond = 1.12;  // factor of the half width at which Ω is checked beyond an edge

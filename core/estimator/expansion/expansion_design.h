@@ -59,8 +59,8 @@ absl::StatusOr<ExpansionDesign> DesignForPrior(const ResolvedProblem& problem);
 // Returns the design of an expansion over the prior and its tails, to the 10⁻⁶ quantiles: Legendre
 // polynomials, which follow the model there as well as where the prior is dense.
 ExpansionDesign DesignForTails(const ResolvedProblem& problem);
-// Whether estimates begin with DesignForTails: those of a single parameter that is not uniform,
-// where that costs little and no mode of the posterior in the prior's tails is lost.
+// Whether estimates begin with DesignForTails: those of one or two parameters that are not all
+// uniform, where that costs little and no mode of the posterior in the prior's tails is lost.
 bool BeginsInTails(const ResolvedProblem& problem);
 // Returns the design with which estimates begin: DesignForTails where they do so, or where
 // `in_tails` asks for it, else DesignForPrior.

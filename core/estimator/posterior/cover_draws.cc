@@ -16,6 +16,8 @@ constexpr double kNegligibleCost = 18;
 // Effective number of points at which a cover resolves the density.
 constexpr double kResolved = 64;
 constexpr double kTemper = 0.5;
+constexpr double kMaxMultiple = 4;  // of the points asked for
+constexpr double kSpare = 1.1;      // points more than are expected to be enough
 
 struct Box {
   Vector lower, upper;
@@ -91,12 +93,16 @@ std::optional<WeightedDraws> DrawFromCover(const Cost& cost, const ExpansionDesi
     box = smaller;
     if (ratio > 0.5) break;
   }
-  cover = CoverOf(box, points);
-  confined.Evaluate(cover, costs);
-  if (!std::isfinite(costs.minCoeff())) return std::nullopt;
-  WeightedDraws draws = WeightedBy(costs, cover);
-  if (draws.effective_size < effective_size) return std::nullopt;
-  return draws;
+  // The effective number grows as the number of points.
+  for (double count = points; count <= kMaxMultiple * points;) {
+    cover = CoverOf(box, static_cast<int>(count));
+    confined.Evaluate(cover, costs);
+    if (!std::isfinite(costs.minCoeff())) return std::nullopt;
+    WeightedDraws draws = WeightedBy(costs, cover);
+    if (draws.effective_size >= effective_size) return draws;
+    count *= kSpare * effective_size / draws.effective_size;
+  }
+  return std::nullopt;
 }
 
 }  // namespace polyest::internal
