@@ -173,6 +173,7 @@ absl::Status Estimator::Implementation::Restore(const EstimatorSnapshot& snapsho
   }
   POLYEST_ASSIGN_OR_RETURN(EstimatorState state, DecodeState(snapshot.state, snapshot.rows,
                                                              FingerprintOf(problem_.problem())));
+  POLYEST_RETURN_IF_ERROR(SecondSearch::CheckState(state.search, snapshot.rows));
   POLYEST_ASSIGN_OR_RETURN(
       mixture_, ComponentMixture::FromState(problem_, std::move(state.mixture), snapshot.rows,
                                             store_.get(), threads_, stop));

@@ -1,5 +1,6 @@
 #include "core/estimator/second_search.h"
 
+#include <algorithm>
 #include <optional>
 #include <utility>
 
@@ -18,6 +19,14 @@ constexpr double kBetter = 0.8;
 constexpr int64_t kSearchesInLimit = 10;
 
 }  // namespace
+
+absl::Status SecondSearch::CheckState(const State& state, int64_t rows) {
+  if (state.row > rows && state.row <= std::max(kFirstRow, NextWindow(rows)) &&
+      state.tried_row >= 0 && state.tried_row <= rows && state.tried_misfit >= 0) {
+    return absl::OkStatus();
+  }
+  return absl::DataLossError("the snapshot's looks for a better minimum cannot be of its rows");
+}
 
 bool SecondSearch::IsDue(const Problem& problem, double misfit) const {
   if (!problem.expansion.adaptive || misfit < kMinMisfit) return false;

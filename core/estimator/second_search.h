@@ -34,7 +34,7 @@ class SecondSearch {
                     const Stop& stop, std::unique_ptr<ComponentMixture>& mixture);
 
   struct State {
-    int64_t row = 4;          // of the next look
+    int64_t row = kFirstRow;  // of the next look
     int64_t tried_row = 0;    // of the last search that found nothing
     double tried_misfit = 0;  // there
 
@@ -44,9 +44,13 @@ class SecondSearch {
     }
   };
   const State& state() const { return state_; }
+  // Returns DATA_LOSS if no search can have this state after so many rows.
+  static absl::Status CheckState(const State& state, int64_t rows);
   void Restore(const State& state) { state_ = state; }
 
  private:
+  static constexpr int64_t kFirstRow = 4;
+
   bool IsDue(const Problem& problem, double misfit) const;
   // Searches once, and returns whether the mixture was replaced.
   absl::StatusOr<bool> Search(const ResolvedProblem& problem, const SampleStore* store, int threads,

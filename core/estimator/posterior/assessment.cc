@@ -70,6 +70,11 @@ class Assessment {
         std::hypot(findings_.shift, findings_.integration_shift, findings_.population_shift);
     fitted_ = FittedParameters(design_.region.HessianToGerm(cost.MismatchHessian(eta)), prior_);
     spent_ = fitted_ + 2;
+    information_ = design_.region.HessianToGerm(cost.InformationHessian(eta, spent_));
+    if (!information_.allFinite()) {
+      return absl::FailedPreconditionError(
+          "the curvature of the cost at its minimum is not finite");
+    }
     // The noise is judged by the draws before they are widened: farther out, the residuals are
     // those of the expansion.
     estimate_.channels = DescribeChannels(request_, cost, eta, posterior_, fitted_);
@@ -192,10 +197,9 @@ class Assessment {
   void DescribeParameters(const Cost& cost, const Vector& eta) {
     const Vector widening =
         shift_widening_ * noise_widening_.cwiseProduct(findings_.windows.widening);
-    Vector informed = widening.cwiseProduct(ContractionByData(cost, eta)).cwiseMin(1);
+    Vector informed = widening.cwiseProduct(ContractionByData()).cwiseMin(1);
     DescribeSpread(cost, eta, widening, informed);
-    estimate_.directions =
-        Directions(design_.region.HessianToGerm(cost.InformationHessian(eta, spent_)), prior_);
+    estimate_.directions = Directions(information_, prior_);
     const Vector map = prior_.ToParameters(findings_.map_xi);
     const Vector prior_mean = prior_.Mean();
     const Vector prior_deviation = prior_.StandardDeviation();
@@ -345,12 +349,11 @@ class Assessment {
   // The second comes from
   //   (H_mismatch + Σ_prior⁻¹)⁻¹,
   // in which the sharp mode of a skewed prior does not count as information either.
-  Vector ContractionByData(const Cost& cost, const Vector& eta) const {
+  Vector ContractionByData() const {
     const Vector& xi = findings_.map_xi;
-    const Matrix mismatch = design_.region.HessianToGerm(cost.InformationHessian(eta, spent_));
-    Matrix curved = mismatch;
+    Matrix curved = information_;
     curved.diagonal() += prior_.Curvature(xi);
-    Matrix spread = mismatch;
+    Matrix spread = information_;
     spread.diagonal() += prior_.GermStandardDeviation().cwiseAbs2().cwiseInverse();
     return CovarianceFromCurvature(curved, prior_, xi)
         .contraction.cwiseMax(CovarianceFromCurvature(spread, prior_, xi).contraction);
@@ -361,8 +364,9 @@ class Assessment {
   const AssessmentRequest& request_;
   const ExpansionDesign& design_;
   double regularization_ = 1;
-  double fitted_ = 0;  // number of parameters fitted by the data
-  double spent_ = 0;   // degrees of freedom used up, see Cost::MismatchHessian
+  double fitted_ = 0;   // number of parameters fitted by the data
+  double spent_ = 0;    // degrees of freedom used up, see Cost::MismatchHessian
+  Matrix information_;  // of the data on the germ at the minimum, n × n
   PosteriorDraws posterior_;
   FilteredDraws filtered_;     // at these draws
   double shift_widening_ = 1;  // factor of the uncertainty for the expansion's own error

@@ -46,7 +46,7 @@ bool IsStateFor(const ResolvedProblem& problem, const ComponentState& state) {
          state.windows_from <= state.taken && state.expansion.absorbed.rows == state.taken &&
          state.particles.cols() == problem.dimension() && state.particles.allFinite() &&
          IsMemoryFor(problem, state.memory, state.particles) && state.weight >= 0 &&
-         state.weight <= 1 && state.room >= 1 &&
+         state.weight <= 1 && state.room >= 1 && state.settlements_at_row >= 0 &&
          IsSummaryFor(problem, state.summary, state.taken) &&
          ReplayAllowance::IsState(state.allowance, state.taken);
 }

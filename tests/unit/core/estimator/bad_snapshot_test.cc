@@ -170,6 +170,25 @@ TEST_F(BadSnapshot, BeginsAtOtherTimesThanTheRows) {
   EXPECT_THAT(status.message(), HasSubstr("not those of the snapshot"));
 }
 
+// The rows up to the next look are caught up with one look at a time.
+TEST_F(BadSnapshot, LooksForABetterMinimumAtRowsThatCannotBe) {
+  const uint32_t fingerprint = FingerprintOf(problem_);
+  const auto restored = [&](int64_t SecondSearch::State::*row, int64_t value) {
+    EstimatorState state = DecodeState(good_.state, good_.rows, fingerprint).value();
+    state.search.*row = value;
+    return Restored(EncodeState(state, good_.rows, fingerprint));
+  };
+  EXPECT_TRUE(restored(&SecondSearch::State::row, good_.rows + 1).ok());
+  EXPECT_TRUE(restored(&SecondSearch::State::tried_row, good_.rows).ok());
+  constexpr int64_t kFar = int64_t{1} << 62;
+  for (const int64_t row : {-kFar, good_.rows, 2 * good_.rows, kFar}) {
+    EXPECT_TRUE(absl::IsDataLoss(restored(&SecondSearch::State::row, row))) << row;
+  }
+  for (const int64_t row : {-kFar, good_.rows + 1}) {
+    EXPECT_TRUE(absl::IsDataLoss(restored(&SecondSearch::State::tried_row, row))) << row;
+  }
+}
+
 // The description of a model, with another identity.
 class OtherFile final : public Model {
  public:
