@@ -2,21 +2,58 @@
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
-#include <google/protobuf/io/zero_copy_stream_impl_lite.h>
-#include <google/protobuf/util/delimited_message_util.h>
+#include <zlib.h>
 
+#include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstring>
 #include <utility>
 
 #include "client/cpp/file_kind.h"
-#include "core/common/check.h"
 #include "core/common/status.h"
 
 namespace polyest::internal {
 namespace {
 
-constexpr char kFirstLine[] = "polyest session 1";
+constexpr char kFirstLine[] = "polyest session 2\n";
+constexpr size_t kLineBytes = sizeof(kFirstLine) - 1;
+constexpr size_t kNumberBytes = 4;
+
+uint32_t ChecksumOf(const std::string& bytes) {
+  return static_cast<uint32_t>(
+      crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
+}
+
+// Appends a number, the lowest byte first.
+void AppendNumber(uint32_t number, std::string& bytes) {
+  for (size_t i = 0; i < kNumberBytes; ++i) {
+    bytes.push_back(static_cast<char>(number >> (8 * i) & 0xff));
+  }
+}
+
+std::optional<uint32_t> ReadNumber(std::istream& in) {
+  std::array<char, kNumberBytes> bytes{};
+  if (!in.read(bytes.data(), bytes.size())) return std::nullopt;
+  uint32_t number = 0;
+  for (size_t i = bytes.size(); i-- > 0;) {
+    number = number << 8 | static_cast<unsigned char>(bytes[i]);
+  }
+  return number;
+}
+
+// Reads so many bytes, or as many as there are: a length that is damaged asks for no memory.
+std::string ReadBytes(std::istream& in, size_t count) {
+  constexpr size_t kAtOnce = size_t{1} << 20;
+  std::string bytes;
+  while (bytes.size() < count && in) {
+    const size_t begin = bytes.size(), part = std::min(kAtOnce, count - begin);
+    bytes.resize(begin + part);
+    in.read(bytes.data() + begin, static_cast<std::streamsize>(part));
+    bytes.resize(begin + static_cast<size_t>(in.gcount()));
+  }
+  return bytes;
+}
 
 }  // namespace
 
@@ -24,20 +61,24 @@ absl::StatusOr<std::unique_ptr<SessionFileWriter>> SessionFileWriter::Open(
     const std::string& file) {
   constexpr mode_t kAnybody = 0666;
   POLYEST_ASSIGN_OR_RETURN(auto draft, DraftFile::Open(file, kAnybody));
-  POLYEST_RETURN_IF_ERROR(draft->Write(absl::StrCat(kFirstLine, "\n")));
+  POLYEST_RETURN_IF_ERROR(draft->Write(kFirstLine));
   return std::unique_ptr<SessionFileWriter>(new SessionFileWriter(std::move(draft)));
 }
 
 absl::Status SessionFileWriter::Write(const v1::SessionRecord& record) {
+  const std::string encoded = record.SerializeAsString();
   std::string bytes;
-  {
-    google::protobuf::io::StringOutputStream stream(&bytes);
-    POLYEST_CHECK(google::protobuf::util::SerializeDelimitedToZeroCopyStream(record, &stream));
-  }
-  return draft_->Write(bytes);
+  AppendNumber(static_cast<uint32_t>(encoded.size()), bytes);
+  AppendNumber(ChecksumOf(encoded), bytes);
+  return draft_->Write(bytes + encoded);
 }
 
-absl::Status SessionFileWriter::Finish() { return draft_->Replace(); }
+absl::Status SessionFileWriter::Finish() {
+  std::string end;
+  AppendNumber(0, end);
+  POLYEST_RETURN_IF_ERROR(draft_->Write(end));
+  return draft_->Replace();
+}
 
 absl::StatusOr<std::unique_ptr<SessionFileReader>> SessionFileReader::Open(
     const std::string& file) {
@@ -47,26 +88,29 @@ absl::StatusOr<std::unique_ptr<SessionFileReader>> SessionFileReader::Open(
     return absl::InvalidArgumentError(
         absl::StrFormat("%s: cannot be read: %s", file, std::strerror(errno)));
   }
-  // Reads no more bytes than the first line has.
-  std::string line(sizeof(kFirstLine), '\0');
-  reader->in_.read(line.data(), static_cast<std::streamsize>(line.size()));
-  if (!reader->in_ || line != std::string(kFirstLine) + "\n") {
+  if (ReadBytes(reader->in_, kLineBytes) != kFirstLine) {
     return absl::InvalidArgumentError(
         absl::StrFormat("%s: is not a session file written by polyest export", file));
   }
-  reader->input_ = std::make_unique<google::protobuf::io::IstreamInputStream>(&reader->in_);
   return reader;
 }
 
 absl::StatusOr<std::optional<v1::SessionRecord>> SessionFileReader::Read() {
-  v1::SessionRecord record;
-  bool end = false;
-  if (google::protobuf::util::ParseDelimitedFromZeroCopyStream(&record, input_.get(), &end)) {
-    return record;
+  ++record_;
+  const std::optional<uint32_t> length = ReadNumber(in_);
+  if (length == uint32_t{0}) return std::nullopt;
+  const std::optional<uint32_t> checksum = ReadNumber(in_);
+  const std::string encoded = length ? ReadBytes(in_, *length) : "";
+  if (!length || !checksum || encoded.size() < *length) {
+    return absl::InvalidArgumentError(
+        absl::StrFormat("%s: ends in record %d, without an end (incomplete file)", file_, record_));
   }
-  if (end) return std::nullopt;
-  return absl::InvalidArgumentError(
-      absl::StrFormat("%s: ends in the middle of a record (incomplete file)", file_));
+  v1::SessionRecord record;
+  if (ChecksumOf(encoded) != *checksum || !record.ParseFromString(encoded)) {
+    return absl::InvalidArgumentError(absl::StrFormat(
+        "%s: record %d is damaged: its checksum is not that of its bytes", file_, record_));
+  }
+  return record;
 }
 
 }  // namespace polyest::internal

@@ -2,11 +2,12 @@
 
 // Writes and reads session files, for `polyest export` and `polyest import`. A file has a first
 // line that identifies its kind and then polyest.v1.SessionRecord messages, each after its length
-// as a varint.
+// and its CRC-32, and after the last one a length of 0. These numbers are of four bytes, the lowest
+// first.
 
 #include <absl/status/statusor.h>
-#include <google/protobuf/io/zero_copy_stream_impl.h>
 
+#include <cstdint>
 #include <fstream>
 #include <memory>
 #include <optional>
@@ -24,7 +25,7 @@ class SessionFileWriter {
   static absl::StatusOr<std::unique_ptr<SessionFileWriter>> Open(const std::string& file);
   // Appends the record. Fails as Open.
   absl::Status Write(const v1::SessionRecord& record);
-  // Replaces the file by the draft, and returns when that is on the disk.
+  // Ends the draft, replaces the file by it, and returns when that is on the disk. Fails as Open.
   absl::Status Finish();
 
  private:
@@ -38,8 +39,8 @@ class SessionFileReader {
   // Opens a file. INVALID_ARGUMENT if it cannot be read or is not a session file.
   static absl::StatusOr<std::unique_ptr<SessionFileReader>> Open(const std::string& file);
 
-  // Returns the next record; none at the end of the file. INVALID_ARGUMENT if the file ends within
-  // a record.
+  // Returns the next record; none after the last. INVALID_ARGUMENT names a record that is damaged
+  // or in which the file ends.
   absl::StatusOr<std::optional<v1::SessionRecord>> Read();
 
  private:
@@ -47,7 +48,7 @@ class SessionFileReader {
 
   const std::string file_;
   std::ifstream in_;
-  std::unique_ptr<google::protobuf::io::IstreamInputStream> input_;
+  int64_t record_ = 0;  // the number of the record read last, from 1
 };
 
 }  // namespace polyest::internal

@@ -55,17 +55,28 @@ std::string InWords(int code) {
 // The data of NLopt's callback for the function.
 struct Callback {
   UnitProblem* problem;
-  nlopt::opt* solver;
+  nlopt::opt* solver = nullptr;
+  std::exception_ptr thrown;  // by the function, which NLopt would make a code of failure of
 };
 
-double CallFunction(const std::vector<double>& u, std::vector<double>& gradient, void* data) {
-  const Callback& callback = *static_cast<Callback*>(data);
-  if (callback.problem->PollStop()) callback.solver->force_stop();
+double ValueAt(UnitProblem& problem, const std::vector<double>& u, std::vector<double>& gradient) {
   const Vector point = Eigen::Map<const Vector>(u.data(), static_cast<Eigen::Index>(u.size()));
   Vector slope;
-  const double value = callback.problem->Value(point, gradient.empty() ? nullptr : &slope);
+  const double value = problem.Value(point, gradient.empty() ? nullptr : &slope);
   if (!gradient.empty()) Eigen::Map<Vector>(gradient.data(), slope.size()) = slope;
   return std::min(value, kHuge);
+}
+
+double CallFunction(const std::vector<double>& u, std::vector<double>& gradient, void* data) {
+  Callback& callback = *static_cast<Callback*>(data);
+  if (callback.problem->PollStop()) callback.solver->force_stop();
+  try {
+    return ValueAt(*callback.problem, u, gradient);
+  } catch (...) {
+    callback.thrown = std::current_exception();
+    callback.solver->force_stop();
+    return kHuge;
+  }
 }
 
 // Evaluates all constraints at once: rows u − bounds ≤ 0, the gradient row-major.
@@ -87,9 +98,10 @@ struct Run {
 Run RunSolver(UnitProblem& problem, const Vector& start, const MinimizerOptions& options) {
   std::vector<double> u(start.data(), start.data() + start.size());
   Run run{start};
+  Callback callback{.problem = &problem, .solver = nullptr, .thrown = nullptr};
   try {
     nlopt::opt solver(nlopt::LD_SLSQP, static_cast<unsigned>(start.size()));
-    Callback callback{&problem, &solver};
+    callback.solver = &solver;
     solver.set_min_objective(CallFunction, &callback);
     solver.set_lower_bounds(0);
     solver.set_upper_bounds(1);
@@ -117,6 +129,7 @@ Run RunSolver(UnitProblem& problem, const Vector& start, const MinimizerOptions&
   } catch (const std::exception&) {
     run.code = nlopt::FAILURE;
   }
+  if (callback.thrown) std::rethrow_exception(callback.thrown);
   const Vector end = Eigen::Map<const Vector>(u.data(), start.size());
   if (end.allFinite()) run.point = problem.Project(end);
   return run;

@@ -28,6 +28,32 @@ double LagCorrelation(double a, double d) {
   return a > 0 ? std::clamp(1 - 0.5 * d / a, -kMaxCorrelation, kMaxCorrelation) : 0;
 }
 
+// Adds what an unknown correlation between neighbouring samples adds, ½ (N − 1) log(1 − r²) with an
+// unknown scale and else −½ A r² = −½ B²/A, B = A − D/2.
+void AddCorrelation(double n, double a, double d, bool scale_unknown, Likelihood& l) {
+  const double r = LagCorrelation(a, d);
+  if (!scale_unknown) {
+    const double b = a * r;
+    l.value -= 0.5 * b * r;
+    l.by_a += -r + 0.5 * r * r;  // ∂B/∂A = 1
+    l.by_d += 0.5 * r;           // ∂B/∂D = −½
+    // The second derivatives of −½ B²/A are those of −½ (A − D + D²/4A).
+    l.by_aa += -0.25 * d * d / (a * a * a);
+    l.by_ad += 0.25 * d / (a * a);
+    l.by_dd += -0.25 / a;
+    return;
+  }
+  const double r_a = 0.5 * d / (a * a), r_d = -0.5 / a;
+  const double m = 0.5 * (n - 1), s = 1 - r * r;
+  const double by_r = -2 * m * r / s, by_rr = -2 * m * (1 + r * r) / (s * s);
+  l.value += m * std::log(s);
+  l.by_a += by_r * r_a;
+  l.by_d += by_r * r_d;
+  l.by_aa += by_rr * r_a * r_a - by_r * d / (a * a * a);
+  l.by_ad += by_rr * r_a * r_d + 0.5 * by_r / (a * a);
+  l.by_dd += by_rr * r_d * r_d;
+}
+
 Likelihood Evaluate(double n, double chi_squared, double differences, bool scale_unknown,
                     bool correlation_unknown) {
   Likelihood l;
@@ -38,7 +64,6 @@ Likelihood Evaluate(double n, double chi_squared, double differences, bool scale
     return l;
   }
   const double a = std::max(chi_squared, n * kMinMeanSquare);
-  const double d = differences;
   if (scale_unknown) {
     // ½ N (1 + log(A/N))
     l.value = 0.5 * n * (1 + std::log(a / n));
@@ -48,30 +73,7 @@ Likelihood Evaluate(double n, double chi_squared, double differences, bool scale
     l.value = 0.5 * a;
     l.by_a = 0.5;
   }
-  if (!correlation_unknown) return l;
-  const double r = LagCorrelation(a, d);
-  const double r_a = 0.5 * d / (a * a), r_d = -0.5 / a;
-  if (scale_unknown) {
-    // ½ (N − 1) log(1 − r²)
-    const double m = 0.5 * (n - 1), s = 1 - r * r;
-    const double by_r = -2 * m * r / s, by_rr = -2 * m * (1 + r * r) / (s * s);
-    l.value += m * std::log(s);
-    l.by_a += by_r * r_a;
-    l.by_d += by_r * r_d;
-    l.by_aa += by_rr * r_a * r_a - by_r * d / (a * a * a);
-    l.by_ad += by_rr * r_a * r_d + 0.5 * by_r / (a * a);
-    l.by_dd += by_rr * r_d * r_d;
-  } else {
-    // −½ A r² = −½ B²/A
-    const double b = a * r;
-    l.value -= 0.5 * b * r;
-    l.by_a += -r + 0.5 * r * r;  // ∂B/∂A = 1
-    l.by_d += 0.5 * r;           // ∂B/∂D = −½
-    // The second derivatives of −½ B²/A with B = A − D/2 are those of −½ (A − D + D²/4A).
-    l.by_aa += -0.25 * d * d / (a * a * a);
-    l.by_ad += 0.25 * d / (a * a);
-    l.by_dd += -0.25 / a;
-  }
+  if (correlation_unknown) AddCorrelation(n, a, differences, scale_unknown, l);
   return l;
 }
 

@@ -16,9 +16,8 @@ constexpr double kFarthestSpread = 100;
 
 using Components = Eigen::Array<double, Eigen::Dynamic, 1, 0, ScoreMixture::kMaxComponents, 1>;
 
-// One run's f, with its derivatives with respect to c, μ and λ = log s.
+// The derivatives of one run's f with respect to c, μ and λ = log s.
 struct RunTerm {
-  double value = 0;
   Eigen::Vector3d gradient;
   Eigen::Matrix3d hessian;
 };
@@ -38,7 +37,6 @@ RunTerm GaussianTerm(double c, double S, const RunScore& population) {
   const double f_cl = 2 * t * (-2 * S * c - N_c * q / w) / w;
   const double f_ml = -2 * t * N_m * q / w / w;
   RunTerm term;
-  term.value = 0.5 * (std::log(w) + N / w - c * c);
   term.gradient << N_c / w - 2 * c, N_m / w, 2 * t * f_t;
   term.hessian << f_cc, -2 / w, f_cl,  //
       -2 / w, 2 * q / w, f_ml,         //
@@ -83,12 +81,9 @@ double MixtureValue(double mean, const ScoreMixture& shape, const RunScore& popu
 RunTerm MixtureTerm(double mean, const ScoreMixture& shape, const RunScore& population) {
   const Components c = CentresOf(mean, shape);
   Components shares = LogTerms(mean, shape, population);
-  const double greatest = shares.maxCoeff();
-  shares = (shares - greatest).exp();
-  const double sum = shares.sum();
-  shares /= sum;
+  shares = (shares - shares.maxCoeff()).exp();
+  shares /= shares.sum();
   RunTerm result;
-  result.value = -greatest - std::log(sum);
   result.gradient.setZero();
   result.hessian.setZero();
   Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();

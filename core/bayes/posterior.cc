@@ -79,7 +79,7 @@ class Sampler {
   }
 
   // Returns the largest step ≤ most that keeps the effective size (Σ w)²/Σ w² above half of the
-  // particles.
+  // particles, rounded up: it is never 0, so that the tempering ends.
   double TemperingStep(double most) const {
     const auto keeps_enough = [&](double step) {
       const Vector w = Weights(step);

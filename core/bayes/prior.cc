@@ -18,7 +18,7 @@ Matrix Independent(size_t count) {
 }
 
 // A population is one of normal scores.
-bool HasNormalScore(const UncertainParameter& parameter) {
+bool IsScoredForPopulation(const UncertainParameter& parameter) {
   const bool in_population = parameter.population || parameter.part == PopulationPart::kMean;
   return in_population && parameter.germ.family != GermFamily::kNormal;
 }
@@ -37,7 +37,7 @@ Prior::Prior(std::vector<UncertainParameter> parameters, const Matrix& correlati
     const UncertainParameter& parameter = parameters_[static_cast<size_t>(i)];
     POLYEST_CHECK(parameter.scale > 0);
     const bool correlated = (correlation.row(i).array() != 0).count() > 1;
-    in_copula_.push_back(correlated || HasNormalScore(parameter));
+    in_copula_.push_back(correlated || IsScoredForPopulation(parameter));
     correlated_ = correlated_ || correlated;
     marginal_germs_.push_back(Germ(parameter.germ));
     germs_.push_back(in_copula_.back() ? Germ::Normal() : marginal_germs_.back());
@@ -75,7 +75,7 @@ bool Prior::IsCurved(int parameter) const {
 }
 
 double Prior::MarginalGerm(int parameter, double z) const {
-  if (!IsCorrelated(parameter)) return z;
+  if (!HasNormalScore(parameter)) return z;
   return marginal_germs_[static_cast<size_t>(parameter)].OfNormalScore(z);
 }
 
@@ -86,7 +86,7 @@ double Prior::OfScore(int parameter, double z) const {
 double Prior::ScoreOf(int parameter, double theta) const {
   const UncertainParameter& marginal = parameters_[static_cast<size_t>(parameter)];
   const double x = marginal.ToGerm(theta);
-  if (!IsCorrelated(parameter)) return x;
+  if (!HasNormalScore(parameter)) return x;
   const Germ& germ = marginal_germs_[static_cast<size_t>(parameter)];
   const bool inside = germ.Lower() <= x && x <= germ.Upper();
   return inside ? germ.NormalScore(x) : std::numeric_limits<double>::quiet_NaN();
@@ -127,7 +127,7 @@ double Prior::SlopeOfScore(int parameter, double z) const {
   const double x = MarginalGerm(parameter, z);
   const double slope = marginal.Slope(x);
   const Germ& germ = marginal_germs_[static_cast<size_t>(parameter)];
-  if (!IsCorrelated(parameter) || germ.family() == GermFamily::kNormal) return slope;
+  if (!HasNormalScore(parameter) || germ.family() == GermFamily::kNormal) return slope;
   // The slope is 0 so near a bound that x is rounded to it: θ does not change any more.
   const double density = germ.Density(x);
   return density > 0 ? slope * NormalDensity(z) / density : 0;
@@ -160,6 +160,12 @@ Vector Prior::GermStandardDeviation() const {
     deviation[i] = germs_[static_cast<size_t>(i)].StandardDeviation();
   }
   return deviation;
+}
+
+double Prior::OffBound(int parameter) const {
+  constexpr double kOffBound = 1e-9;
+  const double width = upper_[parameter] - lower_[parameter];
+  return kOffBound * (std::isfinite(width) ? width : 1);
 }
 
 bool Prior::Contains(const ConstVectorRef& xi) const {

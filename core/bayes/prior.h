@@ -37,14 +37,16 @@ class Prior {
   bool has_exponential_germs() const;  // whether that makes a difference
 
   std::vector<std::string> Names() const;  // of the parameters, in order
-  // The germs of ξ_i and z_i: normal for a correlated parameter, whatever the germ of its marginal.
+  // The germs of ξ_i and z_i: normal for a parameter that is correlated or of a population,
+  // whatever the germ of its marginal.
   const std::vector<Germ>& germs() const { return germs_; }
   const Matrix& factor() const { return factor_; }  // F
   bool correlated() const { return correlated_; }
   bool IsCurved(int parameter) const;  // whether t_i is anything but affine
 
   Vector ToParameters(const ConstVectorRef& xi) const;
-  // Returns ±∞ at a bound of a correlated parameter, and not a number outside of its bounds.
+  // Returns ±∞ at a bound of a parameter that is correlated or of a population, and not a number
+  // outside of its bounds.
   Vector ToGerm(const ConstVectorRef& theta) const;
   Matrix Jacobian(const ConstVectorRef& xi) const;  // ∂θ/∂ξ, n × n
 
@@ -54,7 +56,7 @@ class Prior {
   double ScoreOf(int parameter, double theta) const;   // its inverse, as ToGerm
   double SlopeOfScore(int parameter, double z) const;  // t_i′(z_i)
   // Returns the value x of the parameter's own germ, θ_i = parameters()[i].ToParameter(x); it is z
-  // for a parameter that is not correlated.
+  // for a parameter that is neither correlated nor of a population.
   double MarginalGerm(int parameter, double z) const;
 
   Vector Mean() const;                   // of θ
@@ -64,6 +66,9 @@ class Prior {
   const Vector& lower() const { return lower_; }
   const Vector& upper() const { return upper_; }
   bool Contains(const ConstVectorRef& xi) const;  // ξ ∈ Ω
+  // Returns the distance that searches keep from a germ's bounds, where a density that vanishes has
+  // no finite cost: 10⁻⁹ of the width of Ω, or of 1 where Ω has none.
+  double OffBound(int parameter) const;
 
   // J_apriori (+∞ outside Ω), its gradient (n) and its curvature, the diagonal of the Hessian (n).
   double NegativeLogDensity(const ConstVectorRef& xi) const;
@@ -75,7 +80,8 @@ class Prior {
  private:
   Prior(std::vector<UncertainParameter> parameters, const Matrix& correlation);
 
-  bool IsCorrelated(int parameter) const { return in_copula_[static_cast<size_t>(parameter)]; }
+  // Whether the parameter's germ and score are standard normal for the copula or a population.
+  bool HasNormalScore(int parameter) const { return in_copula_[static_cast<size_t>(parameter)]; }
 
   std::vector<UncertainParameter> parameters_;
   std::vector<Germ> marginal_germs_;  // of the parameters, whether correlated or not

@@ -9,8 +9,7 @@
 namespace polyest::internal {
 namespace {
 
-constexpr double kOffBound = 1e-9;  // distance kept from a bound of Ω, in units of its width (or 1)
-constexpr double kAtBound = 1e-6;   // distance up to which a point counts as at the bound
+constexpr double kAtBound = 1e-6;  // distance up to which a point counts as at the bound
 // The distance from the prior's mean and from ξ̂ within which a germ without bounds is searched, in
 // prior standard deviations.
 constexpr double kReach = 20;
@@ -30,7 +29,7 @@ void SearchBox(const Prior& prior, const Vector& xi, MinimizationProblem& search
   search.bound.resize(0);
   for (int i = 0; i < n; ++i) {
     const double mean = prior.germs()[static_cast<size_t>(i)].Mean();
-    const double reach = kReach * deviation[i], off = kOffBound * Width(prior, i);
+    const double reach = kReach * deviation[i], off = prior.OffBound(i);
     search.lower[i] = std::max(std::min(mean, xi[i]) - reach, prior.lower()[i] + off);
     search.upper[i] = std::min(std::max(mean, xi[i]) + reach, prior.upper()[i] - off);
   }

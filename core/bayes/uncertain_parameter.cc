@@ -29,27 +29,27 @@ constexpr double kGreatestShape = 10'000;
 constexpr double kGreatestRatio = 100;
 
 absl::Status CheckName(const std::string& name) {
-  if (name.empty()) return InvalidField(FieldPath(), "name must not be empty");
+  if (name.empty()) return InvalidField("name", "must not be empty");
   return absl::OkStatus();
 }
 
 absl::Status CheckLocation(const char* family, const char* field, double value) {
   if (std::abs(value) <= kGreatestMagnitude) return absl::OkStatus();
-  return InvalidField(family, absl::StrCat(field, " ", value, " must be finite and at most ",
-                                           kGreatestMagnitude, " in magnitude"));
+  return InvalidField({family, field}, absl::StrCat(value, " must be finite and at most ",
+                                                    kGreatestMagnitude, " in magnitude"));
 }
 
 absl::Status CheckScale(const char* family, const char* field, double value) {
-  if (!(value > 0)) return InvalidField(family, absl::StrCat(field, " ", value, " must be > 0"));
+  if (!(value > 0)) return InvalidField({family, field}, absl::StrCat(value, " must be > 0"));
   if (value >= kMinScale && value <= kGreatestMagnitude) return absl::OkStatus();
-  return InvalidField(family, absl::StrCat(field, " ", value, " must lie between ", kMinScale,
-                                           " and ", kGreatestMagnitude));
+  return InvalidField({family, field}, absl::StrCat(value, " must lie between ", kMinScale, " and ",
+                                                    kGreatestMagnitude));
 }
 
 absl::Status CheckShape(const char* family, const char* field, double value) {
   if (value >= 1 && value <= kGreatestShape) return absl::OkStatus();
-  return InvalidField(family,
-                      absl::StrCat(field, " ", value, " must lie between 1 and ", kGreatestShape));
+  return InvalidField({family, field},
+                      absl::StrCat(value, " must lie between 1 and ", kGreatestShape));
 }
 
 absl::Status CheckBounds(const char* family, double lower, double upper) {
@@ -58,7 +58,9 @@ absl::Status CheckBounds(const char* family, double lower, double upper) {
   if (!(lower < upper)) {
     return InvalidField(family, absl::StrCat("lower ", lower, " must be below upper ", upper));
   }
-  return CheckScale(family, "upper - lower", upper - lower);
+  if (upper - lower >= kMinScale) return absl::OkStatus();
+  return InvalidField(family, absl::StrCat("upper ", upper, " must be above lower ", lower,
+                                           " by at least ", kMinScale));
 }
 
 bool IsLogUniform(const UncertainParameter& parameter) {
@@ -88,7 +90,7 @@ absl::StatusOr<UncertainParameter> UncertainParameter::Normal(std::string name, 
                                                               double std_dev) {
   POLYEST_RETURN_IF_ERROR(CheckName(name));
   POLYEST_RETURN_IF_ERROR(CheckLocation("normal", "mean", mean));
-  POLYEST_RETURN_IF_ERROR(CheckScale("normal", "standard deviation", std_dev));
+  POLYEST_RETURN_IF_ERROR(CheckScale("normal", "std_dev", std_dev));
   return UncertainParameter{std::move(name), Germ::Normal(), mean, std_dev};
 }
 
@@ -124,11 +126,11 @@ absl::StatusOr<UncertainParameter> UncertainParameter::Lognormal(std::string nam
                                                                  double std_dev) {
   POLYEST_RETURN_IF_ERROR(CheckName(name));
   POLYEST_RETURN_IF_ERROR(CheckScale("lognormal", "mean", mean));
-  POLYEST_RETURN_IF_ERROR(CheckScale("lognormal", "standard deviation", std_dev));
+  POLYEST_RETURN_IF_ERROR(CheckScale("lognormal", "std_dev", std_dev));
   if (std_dev > kGreatestRatio * mean) {
-    return InvalidField("lognormal",
-                        absl::StrCat("standard deviation ", std_dev, " must be at most ",
-                                     kGreatestRatio, " times the mean ", mean));
+    return InvalidField(
+        {"lognormal", "std_dev"},
+        absl::StrCat(std_dev, " must be at most ", kGreatestRatio, " times the mean ", mean));
   }
   // scale² = log(1 + s²/m²), location = log m − scale²/2
   const double ratio = std_dev / mean;
@@ -153,7 +155,7 @@ absl::StatusOr<UncertainParameter> UncertainParameter::TruncatedNormal(std::stri
   constexpr char kFamily[] = "truncated_normal";
   POLYEST_RETURN_IF_ERROR(CheckName(name));
   POLYEST_RETURN_IF_ERROR(CheckLocation(kFamily, "mean", mean));
-  POLYEST_RETURN_IF_ERROR(CheckScale(kFamily, "standard deviation", std_dev));
+  POLYEST_RETURN_IF_ERROR(CheckScale(kFamily, "std_dev", std_dev));
   if (!(lower < upper)) {
     return InvalidField(kFamily, absl::StrCat("lower ", lower, " must be below upper ", upper));
   }

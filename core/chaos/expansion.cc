@@ -61,14 +61,13 @@ DensityEstimate DensityOfSamples(const ConstVectorRef& samples, int bins) {
   return estimate;
 }
 
-double QuantileOfSamples(Vector samples, double probability) {
-  POLYEST_CHECK(samples.size() > 0 && probability >= 0 && probability <= 1);
-  std::sort(samples.begin(), samples.end());
-  const double position = probability * static_cast<double>(samples.size() - 1);
+double QuantileOfSorted(const ConstVectorRef& sorted, double probability) {
+  POLYEST_CHECK(sorted.size() > 0 && probability >= 0 && probability <= 1);
+  const double position = probability * static_cast<double>(sorted.size() - 1);
   const auto below = static_cast<Eigen::Index>(std::floor(position));
-  const Eigen::Index above = std::min(below + 1, samples.size() - 1);
+  const Eigen::Index above = std::min(below + 1, sorted.size() - 1);
   const double fraction = position - static_cast<double>(below);
-  return (1 - fraction) * samples[below] + fraction * samples[above];
+  return (1 - fraction) * sorted[below] + fraction * sorted[above];
 }
 
 }  // namespace polyest::internal

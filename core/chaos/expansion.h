@@ -33,7 +33,7 @@ class Expansion {
 // Returns the normalized histogram of finite samples; one bin of unit width if they do not vary.
 DensityEstimate DensityOfSamples(const ConstVectorRef& samples, int bins);
 // Returns the empirical quantile by linear interpolation of the order statistics, 0 ≤ probability
-// ≤ 1.
-double QuantileOfSamples(Vector samples, double probability);
+// ≤ 1. The samples must be in increasing order.
+double QuantileOfSorted(const ConstVectorRef& sorted, double probability);
 
 }  // namespace polyest::internal

@@ -8,6 +8,8 @@ namespace {
 
 constexpr int kDepth = 40;  // bisections of the step
 constexpr std::array<double, 5> kTheta = {0, 0.25, 0.5, 0.75, 1};
+// Below this part of the samples a coefficient between them is rounding error.
+constexpr double kRounding = 1e-12;
 
 StepSamples Bernstein(const StepSamples& v) {
   return {v[0], (-13 * v[0] + 48 * v[1] - 36 * v[2] + 16 * v[3] - 3 * v[4]) / 12,
@@ -71,7 +73,14 @@ Crossing FirstCrossing(const StepSamples& samples, bool from_zero) {
     const bool positive = *std::min_element(values.begin() + 1, values.end()) > 0;
     if (values[0] > 0 && !positive) values[0] = 0;
   }
-  const StepSamples coefficients = Bernstein(values);
+  StepSamples coefficients = Bernstein(values);
+  // A function that falls away from 0 as θ³ has inner coefficients of 0, of which rounding must not
+  // make a crossing.
+  double largest = 0;
+  for (const double value : values) largest = std::max(largest, std::abs(value));
+  for (size_t i = from_zero ? 0 : 1; i + 1 < coefficients.size(); ++i) {
+    if (coefficients[i] <= kRounding * largest) coefficients[i] = std::min(coefficients[i], 0.0);
+  }
   const double theta = FirstPositive(coefficients, 0, 1, kDepth);
   if (!(theta >= 0)) return {};
   constexpr double kDifference = 1e-3;

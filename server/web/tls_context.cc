@@ -67,7 +67,7 @@ absl::Status DemandClientCertificates(const std::string& authorities, SSL_CTX* c
 // Chooses HTTP/1.1 where the client offers it among others.
 int ChooseHttp(SSL*, const unsigned char** chosen, unsigned char* size,
                const unsigned char* offered, unsigned int offered_size, void*) {
-  constexpr unsigned char kHttp11[] = {8, 'h', 't', 't', 'p', '/', '1', '.', '1'};
+  static constexpr unsigned char kHttp11[] = {8, 'h', 't', 't', 'p', '/', '1', '.', '1'};
   unsigned char* found = nullptr;
   const int result =
       SSL_select_next_proto(&found, size, kHttp11, sizeof(kHttp11), offered, offered_size);

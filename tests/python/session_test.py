@@ -283,14 +283,24 @@ def test_an_exported_session_has_the_same_estimate(client, problem, rows, tmp_pa
     restored = client.import_session(file, "imported")
     assert restored.name == "imported"
     assert restored.estimate().to_dict() == expected
-    file.write_bytes(file.read_bytes()[:-3])
-    with pytest.raises(polyest.InvalidInput, match="ends in the middle of a record"):
-        client.import_session(file, "cut-off")
-    first_line = file.read_bytes().partition(b"\n")[0] + b"\n"
-    for damage in (b"\x05" + b"\xff" * 5, b"\xff" * 30):
-        file.write_bytes(first_line + damage)
+
+
+def test_a_damaged_session_file_is_refused(client, problem, rows, tmp_path):
+    file = tmp_path / "run.polyest"
+    with client.session("damaged", problem) as session:
+        session.append(rows(0, 200))
+        session.export(file)
+    whole = file.read_bytes()
+    for cut in (1, 4, 7, len(whole) // 2):
+        file.write_bytes(whole[:-cut])
+        with pytest.raises(polyest.InvalidInput, match="ends in record .*, without an end"):
+            client.import_session(file, "cut-off")
+    beginning = whole.index(b"\n") + 9
+    for at in (beginning, len(whole) // 2, len(whole) - 20):
+        file.write_bytes(whole[:at] + bytes([whole[at] ^ 1]) + whole[at + 1:])
         with pytest.raises(polyest.InvalidInput, match="is damaged"):
-            client.import_session(file, "damaged")
+            client.import_session(file, "flipped")
+    assert "damaged" in {one.name for one in client.sessions()}
 
 
 def test_an_exported_file_is_on_the_disk_before_it_has_its_name(

@@ -197,6 +197,17 @@ Vector NearestInside(const Prior& prior, const Vector& xi) {
   return inside;
 }
 
+Vector MiddleInside(const Prior& prior, const Region& region) {
+  Vector middle = NearestInside(prior, region.centre());
+  const Vector reach = region.axes().cwiseAbs().rowwise().sum();
+  for (Eigen::Index j = 0; j < middle.size(); ++j) {
+    const double low = std::max(prior.lower()[j], region.centre()[j] - reach[j]);
+    const double high = std::min(prior.upper()[j], region.centre()[j] + reach[j]);
+    if (low < high) middle[j] = 0.5 * (low + high);
+  }
+  return middle;
+}
+
 Region RegionOfParticles(const Matrix& xis) {
   const Vector mean = xis.colwise().mean().transpose();
   const Matrix centred = xis.rowwise() - mean.transpose();

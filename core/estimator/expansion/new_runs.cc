@@ -137,9 +137,9 @@ ExpansionDesign DesignAfterEndedRuns(const ResolvedProblem& problem, const Vecto
     middle[j] = 0.5 * (lower + upper);
     axes(j, j) = 0.5 * (upper - lower);
   }
-  const Vector inside = NearestInside(problem.prior(), middle);
+  const Region region(middle, axes);
   ExpansionDesign design = DesignForRegion(problem, FirstTruncation(problem.problem().expansion, n),
-                                           Region(middle, axes), inside);
+                                           region, MiddleInside(problem.prior(), region));
   Particles checks = DrawsForNewRun(problem, centre, factor, CheckCount(n));
   design.check_points = design.region.ManyToLocal(checks.etas);
   design.check_costs = std::move(checks.costs);

@@ -25,16 +25,6 @@ RowBlock FirstRows(const ResolvedProblem& problem, const RowBlock& beginning,
   return block;
 }
 
-LearnedNoise NoiseOf(const ResolvedProblem& problem) {
-  LearnedNoise noise;
-  for (const MeasuredOutput& measured : problem.problem().measured) {
-    const bool correlated = measured.noise.correlation == NoiseCorrelation::kKnown;
-    noise.channels.push_back({.time_constant_s = correlated ? measured.noise.time_constant_s : 0,
-                              .white_share = correlated ? measured.noise.white_share : 0});
-  }
-  return noise;
-}
-
 }  // namespace
 
 void AddPredictionsOf(const RegionalExpansion& expansion, int row, RecordSummary& record) {
@@ -53,8 +43,8 @@ void AddPredictionsOfPrior(const ResolvedProblem& problem, RecordSummary& record
   auto design = DesignForPrior(problem);
   if (!design.ok()) return;
   const Stop stop(std::stop_token(), Stop::Clock::now() + kPatience);
-  auto expansion =
-      RegionalExpansion::Make(problem, &store, *std::move(design), NoiseOf(problem), 1, stop);
+  auto expansion = RegionalExpansion::Make(problem, &store, *std::move(design),
+                                           NoiseToBeginWith(problem.problem()), 1, stop);
   if (!expansion.ok()) return;
   if (!(*expansion)->Propagate(block, stop).ok()) return;
   for (int row = 0; row < (*expansion)->fitted_rows(); ++row) {

@@ -82,6 +82,15 @@ RegionalExpansion::RegionalExpansion(const ResolvedProblem& problem, const Sampl
   if (design_.in_tails) prior_moments_ = MomentsUnderPrior(problem_.prior(), design_);
   design_.basis->EvaluateMany(design_.check_points, check_phi_);
   check_basis_ = PackedMatrix(check_phi_);
+  BeginSums();
+  next_row_ = problem_.first_row();
+  LookFromPosterior();
+  Linearize();
+  TakeEndedRuns();
+}
+
+// Says how the sums of each channel are made into a likelihood.
+void RegionalExpansion::BeginSums() {
   for (int c = 0; c < channels_; ++c) {
     const NoiseModel& model = problem_.problem().measured[static_cast<size_t>(c)].noise;
     ChannelSums& sums = absorbed_.sums[static_cast<size_t>(c)];
@@ -96,14 +105,9 @@ RegionalExpansion::RegionalExpansion(const ResolvedProblem& problem, const Sampl
                           : IsTailed(c)            ? kFilteredDegreesFactor
                                                    : 1;
   }
-  if (problem_.uses_filters()) {
-    for (ChannelSums& sums : absorbed_.sums) sums.log_variance.setZero(reference_phi_.size());
-    absorbed_.point_log_variance.setZero(design_.points.rows());
-  }
-  next_row_ = problem_.first_row();
-  LookFromPosterior();
-  Linearize();
-  TakeEndedRuns();
+  if (!problem_.uses_filters()) return;
+  for (ChannelSums& sums : absorbed_.sums) sums.log_variance.setZero(reference_phi_.size());
+  absorbed_.point_log_variance.setZero(design_.points.rows());
 }
 
 void RegionalExpansion::LookFromPosterior() {
@@ -253,8 +257,8 @@ Vector RegionalExpansion::TermWeights() const {
   return weights;
 }
 
-// With orthonormal polynomials, an output cᵀφ has the mean c_0 and the variance Σ c_s² over s ≥ 1
-// (12).
+// With polynomials that are orthonormal under the prior, an output cᵀφ has the mean c_0 and the
+// variance Σ c_s² over s ≥ 1 (12). Over the tails they are not, and it has those of φ.
 std::optional<PriorPrediction> RegionalExpansion::PredictionOf(int row, int channel) const {
   const double sigma = block_.noise[static_cast<size_t>(row * channels_ + channel)];
   if (!(design_.whole_prior || design_.in_tails) || sigma <= 0) return std::nullopt;

@@ -90,7 +90,8 @@ class RegionalExpansion {
   // Returns how much each term of the basis contributes (S), Σ c_s²/R over the absorbed samples.
   Vector TermWeights() const;
   // Returns what the prior predicts for the channel's sample in that row, if the expansion is over
-  // the whole prior and the prediction is finite. Samples with correlated noise are whitened.
+  // the whole prior or over its tails, too, and the prediction is finite. Samples with correlated
+  // noise are whitened.
   std::optional<PriorPrediction> PredictionOf(int row, int channel) const;
   // Returns the root mean square over the germ of a channel's output at row `row` of the block
   // propagated last; 0 where too few trajectories are left.
@@ -206,6 +207,7 @@ class RegionalExpansion {
   absl::Status DropFailed(int row, const Stop& stop);
   void NoteFailures(int row);
   void TakeEndedRuns();
+  void BeginSums();
   void LookFromPosterior();
   void Linearize();
   void PredictNoise(int first);

@@ -119,11 +119,12 @@ LearnedNoise Elimination::NoiseAbout(const Vector& centre) const {
 absl::Status Elimination::Expand(const RunPath& path, const SampleStore& store, const RunRows& rows,
                                  int threads, const Stop& stop) {
   path_ = path;
-  Region region = JointRegion(path);
-  const Vector inside = NearestInside(problem_.prior(), region.centre());
-  ExpansionDesign design = DesignForRegion(problem_, truncation_, std::move(region), inside);
+  const Region region = JointRegion(path);
+  const Vector centre = NearestInside(problem_.prior(), region.centre());
+  ExpansionDesign design =
+      DesignForRegion(problem_, truncation_, region, MiddleInside(problem_.prior(), region));
   POLYEST_ASSIGN_OR_RETURN(expansion_, RegionalExpansion::Make(problem_, &store, std::move(design),
-                                                               NoiseAbout(inside), threads, stop));
+                                                               NoiseAbout(centre), threads, stop));
   expansion_->BeginAt(rows.first);
   run_ = rows.run;
   RowBlock block;
@@ -153,9 +154,8 @@ Cost Elimination::OwnCost() const {
   std::vector<ChannelSums> sums = expansion_->sums();
   for (ChannelSums& channel : sums) channel.scale_unknown = channel.correlation_unknown = false;
   const ExpansionDesign& design = expansion_->design();
-  Cost cost(design.basis, design.region, design.reference, Mismatch(sums), problem_.prior(),
-            problem_.problem().regularization);
-  return cost;
+  return Cost(design.basis, design.region, design.reference, Mismatch(sums), problem_.prior(),
+              problem_.problem().regularization);
 }
 
 Matrix Elimination::OwnDirections() const {
@@ -168,12 +168,12 @@ Vector Elimination::Origin(const ConstVectorRef& eta_shared) const {
   return eta;
 }
 
-// Returns collocation points of the shared germs; those outside Ω are moved towards the centre.
+// Returns collocation points of the shared germs; those outside Ω are moved inside.
 Matrix Elimination::SharedPoints() const {
   const int count = kPointsPerTerm * ended_.basis->size();
   Matrix points =
       2 * UnitCubePoints(PointSet::kHalton, static_cast<int>(n_shared_), count).array() - 1;
-  Vector inside = NearestInside(problem_.prior(), expansion_->design().region.centre());
+  const Vector inside = MiddleInside(problem_.prior(), expansion_->design().region);
   for (Eigen::Index q = 0; q < count; ++q) {
     Vector xi = inside;
     xi(shared_) = ended_.region.ToGerm(points.row(q).transpose());

@@ -7,10 +7,6 @@
 namespace polyest::internal {
 namespace {
 
-// Distance kept from a bound of Ω, as a fraction of its width: a density that vanishes at the bound
-// has no finite cost.
-constexpr double kOffBound = 1e-9;
-
 // Adds the row aᵀη ≤ bound.
 void Constrain(const Vector& row, double bound, MinimizationProblem& search) {
   search.constraint.conservativeResize(search.constraint.rows() + 1, row.size());
@@ -28,8 +24,7 @@ MinimizationProblem SearchDomain(const ExpansionDesign& design, const Prior& pri
   search.constraint.resize(0, n);
   search.bound.resize(0);
   for (int i = 0; i < n; ++i) {
-    const bool finite = std::isfinite(prior.lower()[i]) && std::isfinite(prior.upper()[i]);
-    const double off = kOffBound * (finite ? prior.upper()[i] - prior.lower()[i] : 1);
+    const double off = prior.OffBound(i);
     for (const double sign : {1.0, -1.0}) {
       const double bound = sign > 0 ? prior.upper()[i] : -prior.lower()[i];
       if (!std::isfinite(bound)) continue;

@@ -160,7 +160,7 @@ ExpansionDesign MixtureComponent::DesignOn(const MixtureComponent& parent,
   const ExpansionDesign& before = parent.expansion_->design();
   const Vector middle = piece.particles.rows() > 0
                             ? Vector(piece.particles.colwise().mean().transpose())
-                            : NearestInside(problem_.prior(), piece.region.centre());
+                            : MiddleInside(problem_.prior(), piece.region);
   ExpansionDesign design =
       DesignForRegion(problem_, before.basis->truncation(), piece.region, middle);
   design.element = piece.element;

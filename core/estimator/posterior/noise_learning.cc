@@ -337,17 +337,6 @@ class Revision {
 
 }  // namespace
 
-LearnedNoise NoiseToBeginWith(const Problem& problem) {
-  LearnedNoise noise;
-  for (const MeasuredOutput& measured : problem.measured) {
-    ChannelNoise channel;
-    channel.time_constant_s = measured.noise.time_constant_s;
-    channel.white_share = measured.noise.white_share;
-    noise.channels.push_back(channel);
-  }
-  return noise;
-}
-
 std::optional<double> UnlearnedScale(const RecordSummary& record, size_t channel, double value,
                                      double predicted, double present) {
   const bool first = record.channels().empty() || record.channels()[channel].samples == 0;

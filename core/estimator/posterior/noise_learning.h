@@ -34,9 +34,6 @@ namespace polyest::internal {
 // scale may still collapse onto a chance fit, with 6 it does not.
 inline int MinSamplesForNoise(int n) { return n + 6; }
 
-// Returns the initial noise: unknown scales are not learned yet, and correlations are as given.
-LearnedNoise NoiseToBeginWith(const Problem& problem);
-
 // Returns the scale of a channel whose scale is not learned yet that its next sample asks for, or
 // nullopt if the present one stays. `value` is |z| of that sample, in units of the noise that the
 // problem gives; it is twice the largest one's. Samples of 0 have no size: before there is another,

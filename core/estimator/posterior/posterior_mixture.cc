@@ -161,6 +161,26 @@ ComponentEstimate DescribePiece(const std::vector<Assessed>& components,
   return piece;
 }
 
+// Adds what is said of a component to what is said of the whole.
+void Include(const Assessed& component, Assessed& whole) {
+  const Findings& found = component.findings;
+  Findings& findings = whole.findings;
+  double& residual = whole.estimate.expansion.residual_to_noise;
+  residual = std::max(residual, component.estimate.expansion.residual_to_noise);
+  findings.shift = std::max(findings.shift, found.shift);
+  findings.integration_shift = std::max(findings.integration_shift, found.integration_shift);
+  findings.population_shift = std::max(findings.population_shift, found.population_shift);
+  findings.carried_shift = std::max(findings.carried_shift, found.carried_shift);
+  findings.power = std::min(findings.power, found.power);
+  if (findings.not_mixed.empty()) findings.not_mixed = found.not_mixed;
+  findings.leans = findings.leans || found.leans;
+  findings.postponed.Include(found.postponed);
+  if (!found.converged && findings.converged) {
+    findings.converged = false;
+    findings.minimizer_reason = found.minimizer_reason;
+  }
+}
+
 Assessed Combine(const std::vector<Assessed>& components, const std::vector<double>& weights,
                  const std::vector<Places>& pieces, const ResolvedProblem& problem) {
   const Assessed& best = components[BestOf(components, weights, pieces.front())];
@@ -169,29 +189,12 @@ Assessed Combine(const std::vector<Assessed>& components, const std::vector<doub
   whole.findings = best.findings;
   whole.findings.drawn_to_curvature = {};  // its draws are not those of the whole
   whole.findings.inaccurate_weight = 0;
-  ExpansionSummary& expansion = whole.estimate.expansion;
   Places all;
   for (size_t k = 0; k < components.size(); ++k) {
     all.push_back(k);
-    const Findings& findings = components[k].findings;
-    if (findings.shift > kInaccurateShift) whole.findings.inaccurate_weight += weights[k];
-    if (weights[k] < kMinWeightToWarn) continue;
-    expansion.residual_to_noise =
-        std::max(expansion.residual_to_noise, components[k].estimate.expansion.residual_to_noise);
-    whole.findings.shift = std::max(whole.findings.shift, findings.shift);
-    whole.findings.integration_shift =
-        std::max(whole.findings.integration_shift, findings.integration_shift);
-    whole.findings.population_shift =
-        std::max(whole.findings.population_shift, findings.population_shift);
-    whole.findings.carried_shift = std::max(whole.findings.carried_shift, findings.carried_shift);
-    whole.findings.power = std::min(whole.findings.power, findings.power);
-    if (whole.findings.not_mixed.empty()) whole.findings.not_mixed = findings.not_mixed;
-    whole.findings.leans = whole.findings.leans || findings.leans;
-    whole.findings.postponed.Include(findings.postponed);
-    if (!findings.converged && whole.findings.converged) {
-      whole.findings.converged = false;
-      whole.findings.minimizer_reason = findings.minimizer_reason;
-    }
+    const double shift = components[k].findings.shift;
+    if (shift > kInaccurateShift) whole.findings.inaccurate_weight += weights[k];
+    if (weights[k] >= kMinWeightToWarn) Include(components[k], whole);
   }
   if (pieces.size() > 1 && whole.findings.UsesData()) {
     for (const Places& places : pieces) {

@@ -15,14 +15,17 @@ namespace {
 // (propagation/output_limit.h).
 constexpr double kLeastNoise = 1e-50, kGreatestNoise = 1e50;
 
-absl::Status ValidateCorrelation(int index, const NoiseModel& noise) {
-  const auto field = [index](const char* name) {
-    return FieldPath{"measured", index, "noise", "correlation", name};
-  };
+absl::Status ValidateCorrelation(const FieldPath& noise_field, const NoiseModel& noise) {
+  const auto field = [&](const char* name) { return noise_field.Then({"correlation", name}); };
   if (!std::isfinite(noise.time_constant_s) || noise.time_constant_s < 0 ||
       (noise.correlation == NoiseCorrelation::kKnown && noise.time_constant_s == 0)) {
     return InvalidField(field("time_constant_s"),
                         absl::StrFormat("%g must be a finite time > 0", noise.time_constant_s));
+  }
+  if (noise.time_constant_s > 0 && noise.correlation != NoiseCorrelation::kKnown) {
+    return InvalidField(
+        field("time_constant_s"),
+        absl::StrFormat("%g has no effect unless the correlation is known", noise.time_constant_s));
   }
   if (!(noise.white_share >= 0 && noise.white_share < 1)) {
     return InvalidField(field("white_share"),
@@ -39,31 +42,36 @@ absl::Status ValidateCorrelation(int index, const NoiseModel& noise) {
 
 }  // namespace
 
-absl::Status ValidateNoise(int index, const MeasuredOutput& measured) {
-  const NoiseModel& noise = measured.noise;
-  for (const auto& [field, value] : {std::pair{"absolute", noise.absolute},
-                                     {"relative", noise.relative},
-                                     {"relative_to_max", noise.relative_to_max},
-                                     {"full_scale", noise.full_scale},
-                                     {"least", noise.least}}) {
+absl::Status ValidateNoise(const FieldPath& field, const NoiseModel& noise) {
+  for (const auto& [name, value] : {std::pair{"absolute", noise.absolute},
+                                    {"relative", noise.relative},
+                                    {"relative_to_max", noise.relative_to_max},
+                                    {"full_scale", noise.full_scale},
+                                    {"least", noise.least}}) {
     if (!std::isfinite(value) || value < 0) {
-      return InvalidField({"measured", index, "noise", field},
+      return InvalidField(field.Then(name),
                           absl::StrFormat("%g must be a finite number ≥ 0", value));
     }
     if (value == 0 || (value >= kLeastNoise && value <= kGreatestNoise)) continue;
-    return InvalidField({"measured", index, "noise", field},
-                        absl::StrFormat("%g must be 0 or lie between %g and %g", value, kLeastNoise,
-                                        kGreatestNoise));
+    return InvalidField(field.Then(name), absl::StrFormat("%g must be 0 or lie between %g and %g",
+                                                          value, kLeastNoise, kGreatestNoise));
   }
-  POLYEST_RETURN_IF_ERROR(ValidateCorrelation(index, noise));
+  POLYEST_RETURN_IF_ERROR(ValidateCorrelation(field, noise));
   if (noise.full_scale > 0 && noise.relative_to_max == 0) {
     return InvalidField(
-        FieldPath{"measured", index, "noise", "full_scale"},
+        field.Then("full_scale"),
         absl::StrFormat("%g has no effect without relativeToMax, the noise as a fraction of it",
                         noise.full_scale));
   }
+  return absl::OkStatus();
+}
+
+absl::Status ValidateNoise(int index, const MeasuredOutput& measured) {
+  const NoiseModel& noise = measured.noise;
+  const FieldPath field{"measured", index, "noise"};
+  POLYEST_RETURN_IF_ERROR(ValidateNoise(field, noise));
   if (!noise.unknown && noise.absolute + noise.relative + noise.relative_to_max <= 0) {
-    return InvalidField(FieldPath{"measured", index, "noise"},
+    return InvalidField(field,
                         absl::StrFormat("output %s needs a noise: at least one of absolute, "
                                         "relative, relativeToMax must be above 0, or the noise "
                                         "unknown",

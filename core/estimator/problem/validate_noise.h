@@ -1,15 +1,18 @@
 #pragma once
 
-// Checks the noise that a problem gives for a measured output.
+// Checks the noise that is given for an output.
 
 #include <absl/status/status.h>
 
+#include "core/common/field_error.h"
 #include "polyest/problem.h"
 
 namespace polyest::internal {
 
-// Returns InvalidArgument that names the field of measured output `index` whose value is refused,
-// the value and the rule.
+// Returns InvalidArgument that names the field below `field` whose value is refused, the value and
+// the rule. A noise without numbers is none, and passes.
+absl::Status ValidateNoise(const FieldPath& field, const NoiseModel& noise);
+// The same for measured output `index`, which needs a noise.
 absl::Status ValidateNoise(int index, const MeasuredOutput& measured);
 
 }  // namespace polyest::internal

@@ -7,6 +7,7 @@
 
 #include "core/common/types.h"
 #include "core/estimator/record/correlation_profile.h"
+#include "polyest/problem.h"
 
 namespace polyest::internal {
 
@@ -53,5 +54,8 @@ struct LearnedNoise {
   // expansion's reference if empty.
   Vector centre;
 };
+
+// Returns the initial noise: unknown scales are not learned yet, and correlations are as given.
+LearnedNoise NoiseToBeginWith(const Problem& problem);
 
 }  // namespace polyest::internal

@@ -98,6 +98,7 @@ class Warnings {
     const auto channels = static_cast<size_t>(problem_.channels());
     for (size_t i = 0; i < inputs_.size(); ++i) {
       AddGaps(NameOf(channels + i), inputs_[i].intervals);
+      AddBeginning(NameOf(channels + i), inputs_[i].intervals);
       AddEnds(NameOf(channels + i), inputs_[i], problem_.knots_needed()[i] == 0);
       AddBends(NameOf(channels + i), inputs_[i], columns_[channels + i],
                problem_.knots_needed()[i]);
@@ -150,6 +151,17 @@ class Warnings {
         "record there with a column run, and make %s uncertain with perRun",
         name, gaps, gaps == 1 ? "" : "s", IntervalFacts::kGapSteps, intervals.longest_s(),
         intervals.longest_after_s(), InitialState());
+  }
+
+  // Before its first sample in a run an input has that sample's value.
+  void AddBeginning(const std::string& name, const IntervalFacts& intervals) {
+    const double late_s = intervals.latest_first_s() - intervals_.latest_first_s();
+    if (!(intervals.usual_s() > 0 && late_s > IntervalFacts::kGapSteps * intervals.usual_s())) {
+      return;
+    }
+    Add("%s: the streamed input has no sample in the first %g s of a run, before t = %g s, and is "
+        "taken to have its first value there; let the record begin at its first sample",
+        name, late_s, intervals.latest_first_s());
   }
 
   // Without any sample in a run an input is 0, and after its last one it stays as it is, which for

@@ -15,6 +15,7 @@
 #include "core/estimator/record/known_inputs_store.h"
 #include "core/estimator/record/sample_checks.h"
 #include "core/estimator/studies/record_pass.h"
+#include "core/estimator/studies/study_options.h"
 
 namespace polyest::internal {
 namespace {
@@ -23,15 +24,6 @@ namespace {
 constexpr Eigen::Index kPointsAtATime = 1024;
 // Half the range of an axis without a bound, in standard deviations from the mean.
 constexpr double kDeviations = 4;
-
-absl::StatusOr<int> FindUncertain(const Prior& prior, const FieldPath& field,
-                                  const std::string& name) {
-  const std::vector<std::string> names = prior.Names();
-  const auto found = std::find(names.begin(), names.end(), name);
-  if (found != names.end()) return static_cast<int>(found - names.begin());
-  return InvalidField(field, absl::StrFormat("\"%s\" is not among the uncertain parameters %s",
-                                             name, absl::StrJoin(names, ", ")));
-}
 
 // Returns the columns of the uncertain parameters on the axes.
 absl::StatusOr<std::vector<int>> ChooseAxes(const Prior& prior, const CostGridOptions& options) {
@@ -233,6 +225,28 @@ absl::Status FillGrid(const ResolvedProblem& problem, const ModelMismatch& model
   return absl::OkStatus();
 }
 
+// Sets the grid's axes, of so many points each, and returns the scores of its points, the first
+// axis running fastest: those of `held`, but for the axes' own.
+Matrix SpreadAxes(const ResolvedProblem& problem, const std::vector<int>& axes, Eigen::Index points,
+                  const Vector& held, CostGrid& grid) {
+  const Prior& prior = problem.prior();
+  const Eigen::Index second = axes.size() == 2 ? points : 1;
+  Matrix scores = held.transpose().replicate(points * second, 1);
+  for (size_t a = 0; a < axes.size(); ++a) {
+    const auto parameter = static_cast<size_t>(axes[a]);
+    const Vector axis = AxisScores(prior.germs()[parameter], points);
+    grid.parameters.push_back(prior.parameters()[parameter].name);
+    grid.units.push_back(problem.units()[parameter]);
+    grid.axes.push_back(axis.unaryExpr([&](double z) { return prior.OfScore(axes[a], z); }));
+    for (Eigen::Index i = 0; i < scores.rows(); ++i) {
+      scores(i, axes[a]) = axis[a == 0 ? i % points : i / points];
+    }
+  }
+  grid.mismatch.resize(points, second);
+  grid.prior.resize(points, second);
+  return scores;
+}
+
 }  // namespace
 
 absl::StatusOr<CostGrid> EvaluateCostGrid(const ResolvedProblem& problem, const Samples& samples,
@@ -263,20 +277,7 @@ absl::StatusOr<CostGrid> EvaluateCostGrid(const ResolvedProblem& problem, const 
 
   CostGrid grid;
   POLYEST_ASSIGN_OR_RETURN(grid.regularization, ChooseRegularization(problem.problem(), options));
-  const Eigen::Index second = axes.size() == 2 ? points : 1;
-  Matrix scores = held.transpose().replicate(points * second, 1);
-  for (size_t a = 0; a < axes.size(); ++a) {
-    const auto parameter = static_cast<size_t>(axes[a]);
-    const Vector axis = AxisScores(prior.germs()[parameter], points);
-    grid.parameters.push_back(prior.parameters()[parameter].name);
-    grid.units.push_back(problem.units()[parameter]);
-    grid.axes.push_back(axis.unaryExpr([&](double z) { return prior.OfScore(axes[a], z); }));
-    for (Eigen::Index i = 0; i < scores.rows(); ++i) {
-      scores(i, axes[a]) = axis[a == 0 ? i % points : i / points];
-    }
-  }
-  grid.mismatch.resize(points, second);
-  grid.prior.resize(points, second);
+  const Matrix scores = SpreadAxes(problem, axes, points, held, grid);
   record.run_ended = true;  // nothing follows
   const std::shared_ptr<SampleStore> store = StoreFor(problem, nullptr);
   POLYEST_RETURN_IF_ERROR(store->Append(record));

@@ -1,8 +1,5 @@
 #include "core/estimator/studies/cost_profile.h"
 
-#include <absl/strings/str_format.h>
-#include <absl/strings/str_join.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -14,13 +11,12 @@
 #include "core/common/status.h"
 #include "core/estimator/expansion/search_domain.h"
 #include "core/estimator/posterior/cost_slice.h"
+#include "core/estimator/studies/study_options.h"
 
 namespace polyest::internal {
 namespace {
 
 constexpr double kReach = 4;  // in posterior standard deviations to each side of the minimum
-// Distance from a bound of Ω, as a fraction of its width (or of 1).
-constexpr double kOffBound = 1e-9;
 
 class Profiler {
  public:
@@ -72,8 +68,7 @@ class Profiler {
     const double middle = at_centre_[i] + to_scores_.row(i).dot(search_.lower + search_.upper) / 2;
     const double half =
         to_scores_.row(i).cwiseAbs().dot((search_.upper - search_.lower).transpose()) / 2;
-    const double width = prior.upper()[i] - prior.lower()[i];
-    const double off = kOffBound * (std::isfinite(width) ? width : 1);
+    const double off = prior.OffBound(i);
     return Vector::LinSpaced(points_,
                              std::max({map - reach, middle - half, prior.lower()[i] + off}),
                              std::min({map + reach, middle + half, prior.upper()[i] - off}));
@@ -197,12 +192,9 @@ CostProfiles LowestOf(const std::vector<CostProfiles>& components,
 }
 
 absl::Status Validate(const ProfileOptions& options, const Prior& prior) {
-  const std::vector<std::string> names = prior.Names();
   for (size_t i = 0; i < options.parameters.size(); ++i) {
-    if (std::find(names.begin(), names.end(), options.parameters[i]) != names.end()) continue;
-    return InvalidField(FieldPath{"parameters", i},
-                        absl::StrFormat("\"%s\" is not among the uncertain parameters %s",
-                                        options.parameters[i], absl::StrJoin(names, ", ")));
+    const FieldPath field{"parameters", i};
+    POLYEST_RETURN_IF_ERROR(FindUncertain(prior, field, options.parameters[i]).status());
   }
   return CheckRange("points", options.points, 3, kMaxProfilePoints);
 }

@@ -1,4 +1,5 @@
 #include "core/estimator/studies/experiment_design.h"
+#include "core/estimator/problem/validate_noise.h"
 
 #include <absl/strings/str_format.h>
 #include <absl/strings/str_join.h>
@@ -19,8 +20,8 @@ namespace polyest::internal {
 namespace {
 
 constexpr int kDraws = 64;  // number of draws of the true value
-// Root mean square of the residual, in units of the noise, above which an expansion is reported as
-// inaccurate.
+// Root mean square of the residual over that of the noise of a mean of all samples, above which an
+// expansion is reported as inaccurate.
 constexpr double kInaccurateResidual = 0.5;
 
 // An output that is, or could be, measured.
@@ -28,16 +29,6 @@ struct Candidate {
   int column;               // column of the model's outputs
   const NoiseModel* noise;  // nullptr if not known
 };
-
-absl::Status CheckNoise(const NoiseModel& noise, const FieldPath& field) {
-  for (const double number :
-       {noise.absolute, noise.relative, noise.relative_to_max, noise.full_scale}) {
-    if (number >= 0 && std::isfinite(number)) continue;
-    return InvalidField(field.Then("noise"),
-                        absl::StrFormat("%g must be a finite number ≥ 0", number));
-  }
-  return absl::OkStatus();
-}
 
 // Returns the problem's channels, then the other possible outputs.
 absl::StatusOr<std::vector<Candidate>> FindCandidates(const ResolvedProblem& problem,
@@ -60,7 +51,7 @@ absl::StatusOr<std::vector<Candidate>> FindCandidates(const ResolvedProblem& pro
                           absl::StrFormat("model %s has no output \"%s\"; it has %s", model.name,
                                           possible.output, ListNames(model.outputs)));
     }
-    POLYEST_RETURN_IF_ERROR(CheckNoise(possible.noise, field));
+    POLYEST_RETURN_IF_ERROR(ValidateNoise(field.Then("noise"), possible.noise));
     if (known(*column)) {
       if (!HasNumbers(possible.noise)) continue;
       return InvalidField(field.Then("noise"),
@@ -157,6 +148,7 @@ class Outlook {
   // Adds a_k = L ∂y_k/∂ξ /√R_k at the draw.
   void AddDraw(int draw, const Basis& basis, const std::vector<NoiseModel>& noises,
                const ExpandedRecord& record) {
+    const auto samples = static_cast<double>(record.residual_variance.size() / m_);
     Vector phi(basis.size());
     Matrix gradient(basis.size(), basis.dimension());
     basis.EvaluateWithGradient(draws_.xi(draw), phi, gradient);
@@ -174,8 +166,8 @@ class Outlook {
       largest[i] = std::max(largest[i], std::abs(y[row]));
       const double sigma = noises[static_cast<size_t>(i)].StandardDeviation(y[row], largest[i]);
       noise_variance_[i] += sigma * sigma;
-      // R = σ² + residual variance
-      const double variance = sigma * sigma + record.residual_variance[row];
+      // R = σ² + N ρ
+      const double variance = sigma * sigma + samples * record.residual_variance[row];
       if (variance > 0) {
         slopes.row(row) /= std::sqrt(variance);
       } else {
@@ -254,7 +246,7 @@ void Diagnose(const PriorExpansion& expansion, const ExpandedRecord& record, con
     const double residual =
         record.residual_variance(Eigen::seq(i, record.residual_variance.size() - 1, m)).mean();
     const double ratio = std::sqrt(residual / outlook.NoiseVariance(i));
-    if (ratio <= kInaccurateResidual) continue;
+    if (ratio * std::sqrt(static_cast<double>(outlook.times())) <= kInaccurateResidual) continue;
     inaccurate.push_back(
         absl::StrFormat("%s by %.2g", design.outputs[static_cast<size_t>(i)].output, ratio));
   }
@@ -262,8 +254,9 @@ void Diagnose(const PriorExpansion& expansion, const ExpandedRecord& record, con
     design.diagnostics.push_back(
         {DiagnosticCode::kExpansionInaccurate,
          absl::StrFormat("the expansion differs from the model, in units of the noise: %s; this "
-                         "counts as noise, so that samples tell more than said here, above all "
-                         "late ones; a higher order or narrower priors bring it down",
+                         "counts as noise that all samples share, so that they tell more than said "
+                         "here, above all late ones; a higher order or narrower priors bring it "
+                         "down",
                          absl::StrJoin(inaccurate, ", "))});
   }
   if (!expansion.failures().empty()) {

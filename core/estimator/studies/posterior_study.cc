@@ -9,6 +9,7 @@
 #include "core/common/field_error.h"
 #include "core/common/status.h"
 #include "core/estimator/studies/sample_choice.h"
+#include "core/estimator/studies/study_options.h"
 
 namespace polyest::internal {
 namespace {
@@ -19,20 +20,10 @@ constexpr int kMaxSweeps = 2'000;
 // Number of importance points for each returned sample; hardly any point is then returned twice.
 constexpr int kPointsPerSample = 4;
 
-// Returns the index of the parameter, or −1 if there is none of that name.
-int Find(const Prior& prior, const std::string& name) {
-  const std::vector<std::string> names = prior.Names();
-  const auto found = std::find(names.begin(), names.end(), name);
-  return found == names.end() ? -1 : static_cast<int>(found - names.begin());
-}
-
 absl::Status CheckJoint(const Prior& prior, size_t index,
                         const std::pair<std::string, std::string>& joint) {
   for (const std::string& name : {joint.first, joint.second}) {
-    if (Find(prior, name) >= 0) continue;
-    return InvalidField(FieldPath{"joints", index},
-                        absl::StrFormat("\"%s\" is not among the uncertain parameters %s", name,
-                                        absl::StrJoin(prior.Names(), ", ")));
+    POLYEST_RETURN_IF_ERROR(FindUncertain(prior, FieldPath{"joints", index}, name).status());
   }
   if (joint.first == joint.second) {
     return InvalidField(
@@ -45,16 +36,7 @@ absl::Status CheckJoint(const Prior& prior, size_t index,
 }  // namespace
 
 absl::Status Validate(const PosteriorOptions& options, const Prior& prior) {
-  if (options.probabilities.size() > kMaxProbabilities) {
-    return InvalidField("probabilities",
-                        absl::StrFormat("%d are given; the limit is %d",
-                                        options.probabilities.size(), kMaxProbabilities));
-  }
-  for (size_t i = 0; i < options.probabilities.size(); ++i) {
-    if (options.probabilities[i] > 0 && options.probabilities[i] < 1) continue;
-    return InvalidField(FieldPath{"probabilities", i},
-                        absl::StrFormat("%g must lie between 0 and 1", options.probabilities[i]));
-  }
+  POLYEST_RETURN_IF_ERROR(CheckProbabilities(options.probabilities));
   POLYEST_RETURN_IF_ERROR(CheckRange("density_bins", options.density_bins, 0, kMaxPosteriorBins));
   POLYEST_RETURN_IF_ERROR(CheckRange("joint_bins", options.joint_bins, 1, kMaxJointBins));
   POLYEST_RETURN_IF_ERROR(CheckRange("samples", options.samples, 0, kMaxPosteriorSamples));
@@ -102,11 +84,13 @@ Posterior DescribePosterior(const Assessed& assessed, const Prior& prior,
     if (draws.r_hat.size() > 0) marginal.r_hat = draws.r_hat[i];
     posterior.marginals.push_back(std::move(marginal));
   }
+  const auto column = [&](const std::string& name) {
+    return thetas.col(FindUncertain(prior, "joints", name).value());
+  };
   for (const auto& [first, second] : options.joints) {
     posterior.joints.push_back(
         {first, second,
-         WeightedJointDensity(thetas.col(Find(prior, first)), thetas.col(Find(prior, second)),
-                              weights, options.joint_bins)});
+         WeightedJointDensity(column(first), column(second), weights, options.joint_bins)});
   }
   SampleChoice choice = ChooseSamples(draws.weights, draws.chain, options.samples);
   posterior.samples = thetas(choice.draws, Eigen::all);

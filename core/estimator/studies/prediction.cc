@@ -17,6 +17,7 @@
 #include "core/estimator/expansion/prior_expansion.h"
 #include "core/estimator/problem/settable_quantities.h"
 #include "core/estimator/studies/prediction_builder.h"
+#include "core/estimator/studies/study_options.h"
 #include "polyest/posterior.h"
 
 namespace polyest::internal {
@@ -94,16 +95,7 @@ absl::StatusOr<std::vector<SampleRow>> ForecastTimes(const PredictionSubject& su
 absl::Status Validate(const PredictionOptions& options, const ResolvedProblem& problem,
                       int64_t rows) {
   POLYEST_ASSIGN_OR_RETURN(const std::vector<int> columns, ChooseOutputs(problem, options.outputs));
-  if (options.probabilities.size() > kMaxProbabilities) {
-    return InvalidField("probabilities",
-                        absl::StrFormat("%d are given; the limit is %d",
-                                        options.probabilities.size(), kMaxProbabilities));
-  }
-  for (size_t i = 0; i < options.probabilities.size(); ++i) {
-    if (options.probabilities[i] > 0 && options.probabilities[i] < 1) continue;
-    return InvalidField(FieldPath{"probabilities", i},
-                        absl::StrFormat("%g must lie between 0 and 1", options.probabilities[i]));
-  }
+  POLYEST_RETURN_IF_ERROR(CheckProbabilities(options.probabilities));
   POLYEST_RETURN_IF_ERROR(CheckRange("draws", options.draws, kLeastDraws, kMaxPredictionDraws));
   POLYEST_RETURN_IF_ERROR(CheckRange("max_rows", options.max_rows, 1, kMaxPredictionRows));
   if (!std::isfinite(options.horizon_s) || options.horizon_s < 0) {

@@ -168,7 +168,7 @@ class OutputPrediction {
     std::sort(sorted.begin(), sorted.end());
     for (size_t i = 0; i < options_.probabilities.size(); ++i) {
       result_.quantiles(place, static_cast<Eigen::Index>(i)) =
-          QuantileOfSamples(sorted, options_.probabilities[i]);
+          QuantileOfSorted(sorted, options_.probabilities[i]);
     }
   }
 

@@ -37,7 +37,7 @@ void Describe(const ConstVectorRef& samples, Eigen::Index k, const PropagationOp
   std::sort(sorted.begin(), sorted.end());
   for (size_t i = 0; i < options.probabilities.size(); ++i) {
     output.quantiles(k, static_cast<Eigen::Index>(i)) =
-        QuantileOfSamples(sorted, options.probabilities[i]);
+        QuantileOfSorted(sorted, options.probabilities[i]);
   }
   if (options.density_bins > 0) {
     output.densities.push_back(DensityOfSamples(sorted, options.density_bins));

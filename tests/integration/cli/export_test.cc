@@ -61,6 +61,10 @@ TEST_F(ExportTest, SaysInOneLineWhatIsWrong) {
   std::ostringstream contents;
   contents << std::ifstream(file, std::ios::binary).rdbuf();
   const std::string whole = contents.str();
+  const auto flipped = [](std::string bytes, size_t at) {
+    bytes[at] = static_cast<char>(bytes[at] ^ 1);
+    return bytes;
+  };
   struct Case {
     std::vector<std::string> arguments;
     int exit_status;
@@ -81,7 +85,13 @@ TEST_F(ExportTest, SaysInOneLineWhatIsWrong) {
            Case{{"import", file, "--session", "A"}, 2, "must be 1 to 63 of a-z"},
            Case{{"import", File("cut", whole.substr(0, whole.size() - 9)), "--session", "b"},
                 2,
-                "ends in the middle of a record (incomplete file)"},
+                "without an end (incomplete file)"},
+           Case{{"import", File("short", whole.substr(0, whole.size() - 4)), "--session", "b"},
+                2,
+                "without an end (incomplete file)"},
+           Case{{"import", File("flipped", flipped(whole, whole.size() / 2)), "--session", "b"},
+                2,
+                "is damaged: its checksum is not that of its bytes"},
        }) {
     const Finished run = OfDaemon(one.arguments);
     EXPECT_EQ(run.exit_status, one.exit_status) << one.words;

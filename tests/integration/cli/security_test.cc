@@ -134,7 +134,7 @@ TEST_F(SecurityTest, RefusesADaemonThatItsCaDoesNotKnow) {
 
 TEST_F(SecurityTest, SaysInEveryKindOfCallThatTheDaemonMayServeTlsOnly) {
   DaemonProcess daemon(WithTls());
-  const std::string session = File("rig.session", "polyest session 1\n");
+  const std::string session = File("rig.session", "polyest session 2\n" + std::string(4, '\0'));
   for (const std::vector<std::string>& command : {std::vector<std::string>{"models"},
                                                   {"watch", "rig"},
                                                   {"export", "rig", folder_ / "exported"},

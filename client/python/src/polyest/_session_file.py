@@ -1,8 +1,14 @@
-"""Session files, as `polyest export` writes them: a line, then records after their lengths."""
+"""Session files, as `polyest export` writes them.
+
+A line, then records, each after its length and its CRC-32, then a length of 0.
+"""
 
 from __future__ import annotations
 
+import itertools
 import os
+import struct
+import zlib
 from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
@@ -13,7 +19,9 @@ from google.protobuf import message
 from polyest._proto.v1 import session_service_pb2
 from polyest.errors import InvalidInput
 
-_FIRST_LINE = b"polyest session 1\n"
+_FIRST_LINE = b"polyest session 2\n"
+_NUMBER = struct.Struct("<I")
+_BEFORE_RECORD = struct.Struct("<II")  # length, CRC-32
 
 
 class SessionFileWriter:
@@ -34,11 +42,12 @@ class SessionFileWriter:
     def write(self, record: session_service_pb2.SessionRecord) -> None:
         """Appends a record."""
         encoded = record.SerializeToString()
-        self._out.write(_varint(len(encoded)) + encoded)
+        self._out.write(_BEFORE_RECORD.pack(len(encoded), zlib.crc32(encoded)) + encoded)
 
     def __exit__(self, kind: Optional[type[BaseException]], error: Optional[BaseException],
                  traceback: Optional[TracebackType]) -> None:
         if kind is None:
+            self._out.write(_NUMBER.pack(0))
             self._out.flush()
             os.fsync(self._out.fileno())
             self._out.close()
@@ -55,18 +64,27 @@ def read(file: Union[str, os.PathLike[str]]) -> Iterator[session_service_pb2.Ses
     with open(os.fspath(file), "rb") as source:
         if source.readline(len(_FIRST_LINE)) != _FIRST_LINE:
             raise InvalidInput(f"{os.fspath(file)}: is not a session file written by an export")
-        while True:
-            length = _read_varint(source, os.fspath(file))
-            if length is None:
+        for number in itertools.count(1):
+            length = _read_number(source)
+            if length == 0:
                 return
-            encoded = source.read(length)
-            if len(encoded) < length:
-                raise InvalidInput(f"{os.fspath(file)}: ends in the middle of a record")
+            checksum = _read_number(source)
+            encoded = source.read(length or 0)
+            where = f"{os.fspath(file)}: record {number}"
+            if length is None or checksum is None or len(encoded) < length:
+                raise InvalidInput(f"{os.fspath(file)}: ends in record {number}, without an end")
+            if zlib.crc32(encoded) != checksum:
+                raise InvalidInput(f"{where} is damaged: its checksum is not that of its bytes")
             try:
                 record = session_service_pb2.SessionRecord.FromString(encoded)
             except message.DecodeError as error:
-                raise InvalidInput(f"{os.fspath(file)}: is damaged: {error}") from error
+                raise InvalidInput(f"{where} is damaged: {error}") from error
             yield record
+
+
+def _read_number(source: BinaryIO) -> Optional[int]:
+    encoded = source.read(_NUMBER.size)
+    return _NUMBER.unpack(encoded)[0] if len(encoded) == _NUMBER.size else None
 
 
 def _sync_folder(folder: Path) -> None:
@@ -78,26 +96,3 @@ def _sync_folder(folder: Path) -> None:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
-
-
-def _varint(value: int) -> bytes:
-    out = bytearray()
-    while value > 0x7F:
-        out.append(value & 0x7F | 0x80)
-        value >>= 7
-    out.append(value)
-    return bytes(out)
-
-
-def _read_varint(source: BinaryIO, file: str) -> Optional[int]:
-    value, shift = 0, 0
-    while byte := source.read(1):
-        value |= (byte[0] & 0x7F) << shift
-        if value >> 31:  # no message of protobuf is that long
-            raise InvalidInput(f"{file}: is damaged: a record is longer than 2 GiB")
-        if byte[0] < 0x80:
-            return value
-        shift += 7
-    if shift:
-        raise InvalidInput(f"{file}: ends in the middle of a length")
-    return None

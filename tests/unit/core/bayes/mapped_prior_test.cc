@@ -66,7 +66,7 @@ TEST(LogUniform, HasItsMoments) {
     EXPECT_NEAR(q.StandardDeviation(), std::sqrt(variance), 1e-6 * std::sqrt(variance));
   }
   EXPECT_THAT(std::string(UncertainParameter::LogUniform("q", 0, 1).status().message()),
-              HasSubstr("lower 0 must be > 0"));
+              HasSubstr("lower: 0 must be > 0"));
   EXPECT_FALSE(UncertainParameter::LogUniform("q", 2, 1).ok());
 }
 
@@ -294,12 +294,11 @@ TEST(MappedParameter, RefusesWhatIsNoLognormal) {
   const auto refusal = [](double mean, double std_dev) {
     return Refusal(UncertainParameter::Lognormal("k", mean, std_dev).status());
   };
-  EXPECT_THAT(refusal(0, 1), HasSubstr("lognormal: mean 0 must be > 0"));
-  EXPECT_THAT(refusal(-3, 1), HasSubstr("mean -3 must be > 0"));
+  EXPECT_THAT(refusal(0, 1), HasSubstr("lognormal.mean: 0 must be > 0"));
+  EXPECT_THAT(refusal(-3, 1), HasSubstr("mean: -3 must be > 0"));
   EXPECT_THAT(refusal(kNan, 1), HasSubstr("mean nan"));
-  EXPECT_THAT(refusal(1, kInfinity), HasSubstr("standard deviation inf must lie between"));
-  EXPECT_THAT(refusal(2, 201),
-              HasSubstr("standard deviation 201 must be at most 100 times the mean 2"));
+  EXPECT_THAT(refusal(1, kInfinity), HasSubstr("std_dev: inf must lie between"));
+  EXPECT_THAT(refusal(2, 201), HasSubstr("std_dev: 201 must be at most 100 times the mean 2"));
 }
 
 TEST(MappedParameter, RefusesWhatIsNoTruncatedNormal) {
@@ -308,7 +307,7 @@ TEST(MappedParameter, RefusesWhatIsNoTruncatedNormal) {
   };
   EXPECT_THAT(refusal(0, 1, 2, 2), HasSubstr("truncated_normal: lower 2 must be below upper 2"));
   EXPECT_THAT(refusal(0, 1, kNan, 2), HasSubstr("lower nan must be below"));
-  EXPECT_THAT(refusal(0, 0, -1, 2), HasSubstr("standard deviation 0 must be > 0"));
+  EXPECT_THAT(refusal(0, 0, -1, 2), HasSubstr("std_dev: 0 must be > 0"));
   EXPECT_THAT(refusal(kInfinity, 1, -1, 2), HasSubstr("mean inf"));
   EXPECT_THAT(refusal(0, 1, 6, kInfinity),
               HasSubstr("only 9.86588e-10 of the normal's probability lies between lower 6 and "

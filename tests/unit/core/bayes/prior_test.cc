@@ -96,14 +96,15 @@ TEST(UncertainParameter, RefusalNamesParameterValueAndRule) {
   EXPECT_THAT(Refusal(UncertainParameter::Uniform("k", 0, kNan)), HasSubstr("upper nan"));
   EXPECT_THAT(Refusal(UncertainParameter::Normal("c", kNan, 1)), HasSubstr("mean nan"));
   EXPECT_THAT(Refusal(UncertainParameter::Normal("c", 0, -1)),
-              HasSubstr("normal: standard deviation -1 must be > 0"));
+              HasSubstr("normal.std_dev: -1 must be > 0"));
   EXPECT_THAT(Refusal(UncertainParameter::Normal("c", 0, kNan)), HasSubstr("must be > 0"));
   EXPECT_THAT(Refusal(UncertainParameter::Normal("c", 0, 1e200)), HasSubstr("must lie between"));
   EXPECT_THAT(Refusal(UncertainParameter::Beta("v", 0.5, 2, 0, 1)),
-              HasSubstr("beta: alpha 0.5 must lie between 1 and"));
+              HasSubstr("beta.alpha: 0.5 must lie between 1 and"));
   EXPECT_THAT(Refusal(UncertainParameter::Beta("v", 2, kNan, 0, 1)), HasSubstr("beta nan"));
   EXPECT_THAT(Refusal(UncertainParameter::Gamma("g", 0.9, 1, 0)), HasSubstr("shape 0.9"));
-  EXPECT_THAT(Refusal(UncertainParameter::Gamma("g", 2, 0, 0)), HasSubstr("scale 0 must be > 0"));
+  EXPECT_THAT(Refusal(UncertainParameter::Gamma("g", 2, 0, 0)),
+              HasSubstr("gamma.scale: 0 must be > 0"));
   EXPECT_THAT(Refusal(UncertainParameter::Gamma("g", 2, 1, kNan)), HasSubstr("shift nan"));
   EXPECT_THAT(Refusal(UncertainParameter::Normal("", 0, 1)), HasSubstr("name"));
 }

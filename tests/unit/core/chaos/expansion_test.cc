@@ -62,13 +62,13 @@ TEST(DensityOfSamples, PutsSamplesThatDoNotVaryIntoOneBin) {
   EXPECT_EQ(estimate.density[0], 1);
 }
 
-TEST(QuantileOfSamples, InterpolatesTheOrderStatistics) {
-  const Vector samples{{3, 1, 2, 5}};
-  EXPECT_EQ(QuantileOfSamples(samples, 0), 1);
-  EXPECT_EQ(QuantileOfSamples(samples, 1), 5);
-  EXPECT_EQ(QuantileOfSamples(samples, 0.5), 2.5);
-  EXPECT_NEAR(QuantileOfSamples(samples, 0.9), 3 + 0.7 * 2, 1e-14);  // at position 2.7
-  EXPECT_EQ(QuantileOfSamples(Vector::Constant(1, 7), 0.3), 7);
+TEST(QuantileOfSorted, InterpolatesTheOrderStatistics) {
+  const Vector samples{{1, 2, 3, 5}};
+  EXPECT_EQ(QuantileOfSorted(samples, 0), 1);
+  EXPECT_EQ(QuantileOfSorted(samples, 1), 5);
+  EXPECT_EQ(QuantileOfSorted(samples, 0.5), 2.5);
+  EXPECT_NEAR(QuantileOfSorted(samples, 0.9), 3 + 0.7 * 2, 1e-14);  // at position 2.7
+  EXPECT_EQ(QuantileOfSorted(Vector::Constant(1, 7), 0.3), 7);
 }
 
 }  // namespace

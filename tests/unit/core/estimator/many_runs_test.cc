@@ -201,5 +201,54 @@ TEST(ManyRuns, OfANonlinearModelWithLevelsAtABoundAgreeWithQuadrature) {
   EXPECT_NEAR(std::sqrt(density.dot(deviate.cwiseAbs2()) - mean * mean), 1, 0.05);
 }
 
+// Runs of two samples, y = a + b t, with b of their own from an exponential distribution, which
+// begins at a bound. The oracle integrates each run's b > 0 in closed form, and a on a grid.
+TEST(ManyRuns, WithPriorsThatEndAtABoundAgreeWithQuadrature) {
+  constexpr int kCount = 80;
+  constexpr double kError = 0.5, kScale = 0.5;
+  UncertainParameter slope = UncertainParameter::Gamma("b", 1, kScale, 0).value();
+  slope.per_run = true;
+  std::mt19937_64 generator(9);
+  std::normal_distribution<double> normal(0, kError);
+  std::exponential_distribution<double> exponential(1 / kScale);
+  Samples samples;
+  samples.columns = {{"y", {}, {}}};
+  for (int run = 0; run < kCount; ++run) {
+    const double b = exponential(generator);
+    for (const double t : {1.0, 2.0}) {
+      samples.run.push_back(run);
+      samples.time_s.push_back(t);
+      samples.columns[0].value.push_back(0.3 + b * t + normal(generator));
+    }
+  }
+  const auto log_density = [&](double a) {
+    double sum = -0.5 * a * a;
+    for (size_t first = 0; first < samples.rows(); first += 2) {
+      // −½ Σ (y − a − b t)²/σ² − b/s = −½ A b² + B b − ½ C
+      double A = 0, B = -1 / kScale, C = 0;
+      for (const size_t row : {first, first + 1}) {
+        const double t = samples.time_s[row], e = samples.columns[0].value[row] - a;
+        A += t * t / (kError * kError);
+        B += t * e / (kError * kError);
+        C += e * e / (kError * kError);
+      }
+      sum += 0.5 * B * B / A - 0.5 * C + std::log(std::erfc(-B / std::sqrt(2 * A)));
+    }
+    return sum;
+  };
+  Vector grid = Vector::LinSpaced(4001, -1, 1.5);
+  Vector weights = grid.unaryExpr(log_density);
+  weights = (weights.array() - weights.maxCoeff()).exp();
+  weights /= weights.sum();
+  const double mean = weights.dot(grid);
+  const double deviation = std::sqrt(weights.dot((grid.array() - mean).square().matrix()));
+  const Estimate estimate = EstimateOf(
+      TextProblem("a + b*t", {UncertainParameter::Normal("a", 0, 1).value(), slope}, kError),
+      samples);
+  const ParameterEstimate& a = Find(estimate, "a");
+  EXPECT_NEAR(a.mean, mean, 0.1 * deviation);
+  EXPECT_NEAR(a.posterior_std_dev, deviation, 0.05 * deviation);
+}
+
 }  // namespace
 }  // namespace polyest::internal

@@ -61,6 +61,17 @@ TEST(FirstCrossing, DoesNotTakeTheStartOnTheSurfaceForOne) {
   }
 }
 
+// The polynomial's inner coefficients are 0, but for rounding of either sign.
+TEST(FirstCrossing, IsNotMadeByRoundingWhereTheFunctionFallsAsAHighPower) {
+  for (const int power : {2, 3, 4}) {
+    for (double size = 0.1; size < 10; size *= 1.07) {
+      const auto falling = [&](double s) { return -std::pow(size * s, power) / 3; };
+      EXPECT_FALSE(FirstCrossing(Sampled(falling), false).found) << power << " " << size;
+      EXPECT_FALSE(FirstCrossing(Sampled(falling), true).found) << power << " " << size;
+    }
+  }
+}
+
 TEST(FirstCrossing, IsAtASampleWhereSomeAreNotFinite) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   constexpr double kInf = std::numeric_limits<double>::infinity();

@@ -169,6 +169,18 @@ TEST(Switching, EmptiesATankWhoseOutflowEndsAtZero) {
                });
 }
 
+// At rest on the surface until t = 1, the argument then leaves it as (t − 1)⁴, upwards or
+// downwards.
+TEST(Switching, LeavesASurfaceAtWhichItRested) {
+  ExpectMotion(
+      {.states = {{"a", "s*max(t - 1, 0)"}, {"b", "a"}, {"c", "b"}, {"y", "if(c > 0, 3*c, 2*c)"}},
+       .outputs = {{"y", "y"}}},
+      "s", {-30, -7, -1, -0.3, -0.01, 0.01, 0.7, 1, 3, 11}, 3, 0.25, 30 * kAccumulated,
+      [](double t, double s) {
+        return (s > 0 ? 3 : 2) * s * std::pow(std::max(t - 1, 0.0), 5) / 120;
+      });
+}
+
 // The half swings of ẍ = −sign x − 0.3 sign ẋ shorten by √(7/13) each, so that there are infinitely
 // many before t = (1/0.7 + 1/1.3) √1.4 ÷ (1 − √(7/13)) = 9.7689.
 TEST(Switching, NamesAnEndlessSequence) {

@@ -248,7 +248,7 @@ TEST(ToProblem, NamesThePlaceOfABadPrior) {
               StartsWith("uncertain[0].gamma: shape 0"));
   EXPECT_EQ(
       MessageWith(R"({"uncertain": [{"name": "v0", "lognormal": {"mean": -1, "stdDev": 1}}]})"),
-      "uncertain[0].lognormal: mean -1 must be > 0");
+      "uncertain[0].lognormal.mean: -1 must be > 0");
   EXPECT_EQ(MessageWith(
                 R"({"uncertain": [{"name": "v0", "truncatedNormal": {"mean": 1, "stdDev": 1}}]})"),
             "uncertain[0].truncatedNormal: lower or upper must be given");
@@ -259,7 +259,7 @@ TEST(ToProblem, NamesThePlaceOfABadPrior) {
             "uncertain[0]: v0 needs a prior: uniform, normal, beta, gamma, lognormal or "
             "truncatedNormal");
   EXPECT_EQ(MessageWith(R"({"uncertain": [{"uniform": {"lower": 0, "upper": 1}}]})"),
-            "uncertain[0]: name must not be empty");
+            "uncertain[0].name: must not be empty");
 }
 
 TEST(ToProblem, NamesTheFieldThatIsWrong) {

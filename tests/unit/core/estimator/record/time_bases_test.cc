@@ -185,6 +185,16 @@ TEST(TimeBases, WarnOfAnInputThatEndsBeforeItsRun) {
   EXPECT_EQ(WarningOf(Interpolation::kHold, record), "");
 }
 
+TEST(TimeBases, WarnOfAnInputThatBeginsAfterItsRun) {
+  Series force = ForceEvery(0.02, 4, Wave);
+  force.erase(force.begin(), force.upper_bound(0.99));
+  for (const Interpolation any : {Interpolation::kHold, Interpolation::kCubic}) {
+    const std::string warning = WarningOf(any, Interleaved(Displacements(80), force));
+    EXPECT_THAT(warning, HasSubstr("force: the streamed input has no sample in the first 0.9"));
+    EXPECT_THAT(warning, HasSubstr("before t = 1 s"));
+  }
+}
+
 // Without any sample an input is 0.
 TEST(TimeBases, WarnOfARunWithoutASampleOfAnInput) {
   Samples without = Interleaved(Displacements(40), {});
