@@ -2,6 +2,9 @@
 
 #include <absl/strings/str_format.h>
 
+#include <chrono>
+#include <future>
+#include <memory>
 #include <utility>
 
 #include "core/common/check.h"
@@ -9,6 +12,12 @@
 #include "core/common/status.h"
 
 namespace polyest::internal {
+namespace {
+
+// Interval between two looks at the stop request.
+constexpr std::chrono::milliseconds kLook{20};
+
+}  // namespace
 
 SessionPlace BatchLedger::kept() const {
   const std::lock_guard lock(mutex_);
@@ -136,6 +145,17 @@ void BatchLedger::WhenKept(int64_t sequence, uint64_t losses, Done done) {
     }
   }
   done(now);
+}
+
+absl::Status BatchLedger::AwaitKept(int64_t sequence, uint64_t losses, const Stop& stop) {
+  // The batch may be settled after this has given up.
+  const auto kept = std::make_shared<std::promise<absl::Status>>();
+  auto outcome = kept->get_future();
+  WhenKept(sequence, losses, [kept](const absl::Status& status) { kept->set_value(status); });
+  while (outcome.wait_for(kLook) != std::future_status::ready) {
+    POLYEST_RETURN_IF_ERROR(stop.Check());
+  }
+  return outcome.get();
 }
 
 void BatchLedger::WhenAllKept(uint64_t losses, Done done) {

@@ -18,6 +18,7 @@
 #include <mutex>
 #include <string>
 
+#include "polyest/stop.h"
 #include "server/journal/session_journal.h"
 
 namespace polyest::internal {
@@ -64,6 +65,9 @@ class BatchLedger {
   // when one of them is lost. If there were more losses since the caller saw `losses` of them,
   // calls it with the reason of the last one, because another batch may have the number now.
   void WhenKept(int64_t sequence, uint64_t losses, Done done);
+  // Waits until WhenKept would call, and returns what it would tell; gives up with the reason of
+  // `stop`. Must not be called by the thread that settles batches.
+  absl::Status AwaitKept(int64_t sequence, uint64_t losses, const Stop& stop);
   // Calls `done` when everything taken so far is kept, for a caller that has seen `losses` losses;
   // with the reason of the last loss if there were more since.
   void WhenAllKept(uint64_t losses, Done done);

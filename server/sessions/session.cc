@@ -5,7 +5,6 @@
 #include <absl/strings/str_format.h>
 
 #include <algorithm>
-#include <future>
 #include <limits>
 #include <utility>
 
@@ -148,7 +147,7 @@ absl::StatusOr<std::shared_ptr<LoadedSession>> Session::Loaded(const Stop& stop)
   const InMemory present = Present();
   if (present.loaded != nullptr && present.losses == losses) {
     if (present.loaded->in_doubt()) {
-      POLYEST_RETURN_IF_ERROR(AwaitKept(*present.loaded));
+      POLYEST_RETURN_IF_ERROR(AwaitKept(*present.loaded, stop));
       POLYEST_RETURN_IF_ERROR(present.loaded->Renew(stop));
     }
     present.loaded->Release(ledger_.kept().sequence);
@@ -286,18 +285,15 @@ absl::Status Session::ProcessIn(LoadedSession& loaded, int64_t sequence, const S
     const absl::Status processed = loaded.ProcessUpTo(sequence, stop);
     if (!absl::IsFailedPrecondition(processed)) return processed;
     POLYEST_RETURN_IF_ERROR(stop.Check());
-    POLYEST_RETURN_IF_ERROR(AwaitKept(loaded));
+    POLYEST_RETURN_IF_ERROR(AwaitKept(loaded, stop));
     POLYEST_RETURN_IF_ERROR(loaded.EndFailedRun(processed, stop));
     Log(spdlog::level::warn, "run ended, because the model could not be computed",
         {{"session", name()}, {"tenant", tenant()}});
   }
 }
 
-absl::Status Session::AwaitKept(const LoadedSession& loaded) {
-  std::promise<absl::Status> kept;
-  WhenKept(loaded.sequence(), Present().losses,
-           [&](const absl::Status& status) { kept.set_value(status); });
-  return kept.get_future().get();
+absl::Status Session::AwaitKept(const LoadedSession& loaded, const Stop& stop) {
+  return ledger_.AwaitKept(loaded.sequence(), Present().losses, stop);
 }
 
 absl::StatusOr<SharedEstimate> Session::CurrentEstimate(const Stop& stop) {

@@ -214,8 +214,8 @@ class Session : public std::enable_shared_from_this<Session> {
   // measurements.
   void Keep(JournalEntry entry, uint64_t losses, int64_t rows, int64_t values, double measured_s);
   absl::Status ProcessIn(LoadedSession& loaded, int64_t sequence, const Stop& stop);
-  // Waits until the journal keeps what the estimator has.
-  absl::Status AwaitKept(const LoadedSession& loaded);
+  // Waits until the journal keeps what the estimator has, as BatchLedger::AwaitKept does.
+  absl::Status AwaitKept(const LoadedSession& loaded, const Stop& stop);
   InMemory Present() const;
   void Replace(InMemory in_memory);
   void Drop();

@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <stop_token>
+#include <thread>
+
 namespace polyest::internal {
 namespace {
 
@@ -160,6 +163,29 @@ TEST_F(BatchLedgerTest, DoesNotTakeALaterBatchForALostOneOfTheSameNumber) {
   ledger_.WhenKept(4, losses, tell);
   EXPECT_EQ(told, (std::vector{absl::StatusCode::kResourceExhausted, absl::StatusCode::kOk,
                                absl::StatusCode::kResourceExhausted}));
+}
+
+TEST_F(BatchLedgerTest, WaitsUntilABatchIsKeptOrLost) {
+  EXPECT_TRUE(ledger_.AwaitKept(3, 0, {}).ok());
+  Take(4);
+  std::thread keeping([this] { Keep(4); });
+  EXPECT_TRUE(ledger_.AwaitKept(4, 0, {}).ok());
+  keeping.join();
+  Take(5);
+  std::thread losing([this] { ledger_.Settle(0, 5, absl::DataLossError("broken")); });
+  EXPECT_TRUE(absl::IsDataLoss(ledger_.AwaitKept(5, 0, {})));
+  losing.join();
+}
+
+TEST_F(BatchLedgerTest, WaitsNoLongerThanItMay) {
+  Take(4);
+  std::stop_source source;
+  source.request_stop();
+  EXPECT_TRUE(absl::IsCancelled(ledger_.AwaitKept(4, 0, Stop(source.get_token()))));
+  const Stop past(std::stop_token(), Stop::Clock::time_point::min());
+  EXPECT_TRUE(absl::IsDeadlineExceeded(ledger_.AwaitKept(4, 0, past)));
+  Keep(4);  // nobody waits any more
+  EXPECT_TRUE(ledger_.AwaitKept(4, 0, past).ok());
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 
 #include <atomic>
 #include <new>
+#include <stop_token>
 
 #include "core/common/check.h"
 #include "core/propagation/trajectory_ensemble.h"
@@ -92,7 +93,7 @@ class UnavailableModelTest : public testing::Test {
                       .value();
     session_ = std::make_shared<Session>(SessionServices{executor_, journal_, models_}, head);
   }
-  void Add(int64_t sequence, int first_row, int rows) {
+  static v1::Measurements Rows(int first_row, int rows) {
     v1::Measurements batch;
     auto& y = *batch.add_channels();
     y.set_name("y");
@@ -100,8 +101,11 @@ class UnavailableModelTest : public testing::Test {
       batch.add_time_s(0.01 * row);
       y.add_values(3 * 0.01 * row);
     }
+    return batch;
+  }
+  void Add(int64_t sequence, int first_row, int rows) {
     ASSERT_TRUE(session_->Load({}).ok());
-    ASSERT_TRUE(session_->Add(sequence, batch).ok());
+    ASSERT_TRUE(session_->Add(sequence, Rows(first_row, rows)).ok());
   }
   v1::Estimate CurrentEstimate() {
     const auto estimate = session_->CurrentEstimate({});
@@ -157,6 +161,19 @@ TEST_F(UnavailableModelTest, LeavesNothingHalfDoneByAnException) {
   const v1::Estimate after = CurrentEstimate();
   EXPECT_EQ(after.samples(), 21);
   EXPECT_NEAR(after.parameters(0).mean(), 3, 0.01);
+}
+
+TEST_F(UnavailableModelTest, DoesNotWaitForASlowJournalOnceItsCallerHasGone) {
+  Add(1, 1, 20);
+  journal_.Hold();
+  ASSERT_TRUE(session_->Add(2, Rows(21, 1)).ok());
+  const auto half_done = [](Estimator&, int64_t) -> absl::Status { throw std::bad_alloc(); };
+  EXPECT_THROW(session_->WithEstimator(half_done, {}).IgnoreError(), std::bad_alloc);
+  std::stop_source gone;
+  gone.request_stop();
+  EXPECT_TRUE(absl::IsCancelled(session_->CurrentEstimate(Stop(gone.get_token())).status()));
+  journal_.Release();
+  EXPECT_EQ(CurrentEstimate().samples(), 21);
 }
 
 }  // namespace
