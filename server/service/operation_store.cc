@@ -25,7 +25,10 @@ constexpr std::chrono::seconds kRetryLater{1};
 // because its request takes memory as long, whether its operation has been forgotten or not.
 class OperationStore::Place {
  public:
-  Place(OperationStore& store, std::string tenant) : store_(store), tenant_(std::move(tenant)) {}
+  // Called with the store's mutex held; the destructor without.
+  Place(OperationStore& store, std::string tenant) : store_(store), tenant_(std::move(tenant)) {
+    ++store_.places_[tenant_];
+  }
   ~Place() { store_.Leave(tenant_); }
   const std::string& tenant() const { return tenant_; }
   Place(const Place&) = delete;
@@ -211,15 +214,15 @@ absl::StatusOr<v1::Operation> OperationStore::Start(const std::string& tenant,
       absl::StrCat("operations/", limits_.prefix, MakeRequestId()), method, wall_clock_(), now_());
   POLYEST_ASSIGN_OR_RETURN(const Job job, make_job(entry->result()));
   Key key;
+  std::shared_ptr<const Place> place;
   {
     const std::lock_guard lock(mutex_);
     ForgetOld();
     POLYEST_RETURN_IF_ERROR(MakeRoom(tenant));
+    place = std::make_shared<const Place>(*this, tenant);
     key = {tenant, ++started_};
     entries_[key] = entry;
-    ++places_[tenant];
   }
-  const auto place = std::make_shared<const Place>(*this, tenant);
   const v1::Operation started = entry->Describe(/*with_result=*/false, now_());
   const absl::Status accepted =
       job.submit([this, entry, place, work = job.work] { Run(entry, place, work); });
