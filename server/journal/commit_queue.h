@@ -102,13 +102,14 @@ class CommitQueue {
     std::vector<DiskUse> uses;
   };
 
+  // The following are called by the queue's thread, without the mutex.
   void Serve();
   Group Take();
+  void Commit(Group group);
+  static bool RefuseThoseThatNeedRoom(Group& group, const absl::Status& refusal);
   // The following are called with the mutex held.
   void TakeTurns(Group& group, bool large);
   void TakeLazy(Group& group);
-  void Commit(Group group);
-  static bool RefuseThoseThatNeedRoom(Group& group, const absl::Status& refusal);
 
   std::unique_ptr<Database> database_;
   const OnCommit on_commit_;
