@@ -158,15 +158,16 @@ void WatchFlow::PredictIfDue() {
 
 void WatchFlow::Predict() {
   const Clock::time_point begin = Clock::now();
+  // Processing and predicting are one piece of work.
+  const Stop stop = stop_.Begin();
   v1::PredictResponse prediction;
   const auto predict = [&](Estimator& estimator, int64_t sequence) -> absl::Status {
-    POLYEST_ASSIGN_OR_RETURN(prediction,
-                             polyest::internal::Predict(*wanted_, estimator, stop_.Begin()));
+    POLYEST_ASSIGN_OR_RETURN(prediction, polyest::internal::Predict(*wanted_, estimator, stop));
     prediction.set_sequence(sequence);
     return absl::OkStatus();
   };
   const absl::Status predicted =
-      stop_.Name(Guarded([&] { return session_->WithEstimator(predict, stop_.Begin()); }));
+      stop_.Name(Guarded([&] { return session_->WithEstimator(predict, stop); }));
   const Clock::time_point end = Clock::now();
   std::lock_guard lock(mutex_);
   predicting_ = false;
