@@ -13,6 +13,7 @@
 #include "polyest/v1/backup_service.grpc.pb.h"
 #include "server/service/record_flow.h"
 #include "server/service/services.h"
+#include "server/service/stream_admission.h"
 
 namespace polyest::internal {
 namespace {
@@ -77,9 +78,15 @@ class BackupCall final : public grpc::ServerWriteReactor<v1::DownloadBackupRespo
  public:
   BackupCall(const ServiceContext& context, const grpc::CallbackServerContext& call)
       : flow_(std::make_shared<BackupFlow>(context.executor)) {
-    const absl::StatusOr<Caller> caller = context.access.Authorize(call, "DownloadBackup");
-    flow_->OnStart(this, caller.ok() ? absl::StrCat(caller->tenant, "/calls") : "",
-                   PartsFor(context, caller));
+    const absl::StatusOr<Caller> admitted =
+        AdmitStream(context, call, "DownloadBackup", OpenCalls::Kind::kWatcher, flow_, ticket_);
+    if (!admitted.ok()) {
+      flow_->OnStart(this, "", admitted.status());
+      return;
+    }
+    const auto parts = std::make_shared<BackupParts>(context);
+    flow_->OnStart(this, absl::StrCat(admitted->tenant, "/calls"),
+                   [parts](const Stop& stop) { return parts->Next(stop); });
   }
 
   void OnWriteDone(bool ok) override { flow_->OnWritten(ok); }
@@ -90,15 +97,6 @@ class BackupCall final : public grpc::ServerWriteReactor<v1::DownloadBackupRespo
   }
 
  private:
-  absl::StatusOr<BackupFlow::Next> PartsFor(const ServiceContext& context,
-                                            const absl::StatusOr<Caller>& caller) {
-    POLYEST_RETURN_IF_ERROR(caller.status());
-    POLYEST_ASSIGN_OR_RETURN(ticket_,
-                             context.calls.Enter(OpenCalls::Kind::kWatcher, caller->tenant, flow_));
-    const auto parts = std::make_shared<BackupParts>(context);
-    return [parts](const Stop& stop) { return parts->Next(stop); };
-  }
-
   std::shared_ptr<BackupFlow> flow_;
   std::unique_ptr<OpenCalls::Ticket> ticket_;
 };

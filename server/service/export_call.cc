@@ -6,6 +6,7 @@
 
 #include "core/common/status.h"
 #include "proto/wire/operations/names.h"
+#include "server/service/stream_admission.h"
 #include "server/sessions/session_export.h"
 
 namespace polyest::internal {
@@ -49,15 +50,8 @@ ExportFlow::PassOn PassOnFor(const ServiceContext& context, grpc::CallbackServer
 ExportCall::ExportCall(ServiceContext& context, grpc::CallbackServerContext& call,
                        const v1::ExportSessionRequest& request)
     : flow_(std::make_shared<ExportFlow>(context.executor, PassOnFor(context, call, request))) {
-  absl::StatusOr<Caller> admitted = context.access.Authorize(call, "ExportSession");
-  if (admitted.ok()) {
-    auto ticket = context.calls.Enter(OpenCalls::Kind::kWatcher, admitted->tenant, flow_);
-    if (ticket.ok()) {
-      ticket_ = *std::move(ticket);
-    } else {
-      admitted = ticket.status();
-    }
-  }
+  const absl::StatusOr<Caller> admitted =
+      AdmitStream(context, call, "ExportSession", OpenCalls::Kind::kWatcher, flow_, ticket_);
   if (!admitted.ok()) {
     flow_->OnStart(this, "", admitted.status());
     return;

@@ -7,6 +7,7 @@
 #include "core/common/status.h"
 #include "server/execution/guarded.h"
 #include "server/service/status_mapping.h"
+#include "server/service/stream_admission.h"
 
 namespace polyest::internal {
 
@@ -118,16 +119,8 @@ void ImportFlow::OnDone() {
 ImportCall::ImportCall(ServiceContext& context, const grpc::CallbackServerContext& call,
                        v1::Session* response)
     : flow_(std::make_shared<ImportFlow>(context, call, response)) {
-  absl::StatusOr<Caller> admitted = context.access.Authorize(call, "ImportSession");
-  if (admitted.ok()) {
-    auto ticket = context.calls.Enter(OpenCalls::Kind::kWriter, admitted->tenant, flow_);
-    if (ticket.ok()) {
-      ticket_ = *std::move(ticket);
-    } else {
-      admitted = ticket.status();
-    }
-  }
-  flow_->OnStart(this, admitted);
+  flow_->OnStart(
+      this, AdmitStream(context, call, "ImportSession", OpenCalls::Kind::kWriter, flow_, ticket_));
 }
 
 void ImportCall::OnDone() {

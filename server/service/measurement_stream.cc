@@ -12,6 +12,7 @@
 #include "server/execution/guarded.h"
 #include "server/service/catch_up.h"
 #include "server/service/status_mapping.h"
+#include "server/service/stream_admission.h"
 
 namespace polyest::internal {
 
@@ -19,14 +20,6 @@ MeasurementFlow::MeasurementFlow(ServiceContext& context, grpc::CallbackServerCo
     : context_(context),
       call_(call),
       stop_(call, stop_source_.get_token(), context.max_computing) {}
-
-absl::StatusOr<Caller> MeasurementFlow::Authorize() const {
-  POLYEST_ASSIGN_OR_RETURN(Caller caller, context_.access.Authorize(call_, "StreamMeasurements"));
-  if (session_ != nullptr && session_->tenant() != caller.tenant) {
-    return absl::PermissionDeniedError("the token is another tenant's now");
-  }
-  return caller;
-}
 
 void MeasurementFlow::OnStart(MeasurementReactor* reactor, const absl::Status& admitted) {
   std::lock_guard lock(mutex_);
@@ -67,7 +60,8 @@ void MeasurementFlow::OnRead(bool ok) {
 }
 
 void MeasurementFlow::Accept(v1::StreamMeasurementsRequest request) {
-  const absl::StatusOr<Caller> caller = Authorize();
+  const absl::StatusOr<Caller> caller =
+      AuthorizeStream(context_, call_, "StreamMeasurements", session_.get());
   if (!caller.ok()) return End(caller.status());
   if (const absl::Status attached = Attach(*caller, request); !attached.ok()) return End(attached);
   held_bytes_ += static_cast<int64_t>(request.ByteSizeLong());
@@ -282,14 +276,9 @@ void MeasurementFlow::OnKept(int64_t sequence, const absl::Status& kept) {
 
 MeasurementStream::MeasurementStream(ServiceContext& context, grpc::CallbackServerContext& call)
     : flow_(std::make_shared<MeasurementFlow>(context, call)) {
-  const absl::StatusOr<Caller> caller = flow_->Authorize();
-  absl::Status admitted = caller.status();
-  if (admitted.ok()) {
-    auto ticket = context.calls.Enter(OpenCalls::Kind::kWriter, caller->tenant, flow_);
-    admitted = ticket.status();
-    if (admitted.ok()) ticket_ = *std::move(ticket);
-  }
-  flow_->OnStart(this, admitted);
+  flow_->OnStart(this, AdmitStream(context, call, "StreamMeasurements", OpenCalls::Kind::kWriter,
+                                   flow_, ticket_)
+                           .status());
 }
 
 void MeasurementStream::OnDone() {

@@ -44,10 +44,6 @@ class MeasurementFlow final : public SessionObserver,
  public:
   MeasurementFlow(ServiceContext& context, grpc::CallbackServerContext& call);
 
-  // Checks that the caller may stream to the session. This is asked again for each message, because
-  // a token may be revoked while the stream is open.
-  absl::StatusOr<Caller> Authorize() const;
-
   // The following handle the reactor's events.
   void OnStart(MeasurementReactor* reactor, const absl::Status& admitted);
   void OnRead(bool ok);

@@ -12,6 +12,7 @@
 #include "proto/wire/operations/operations.h"
 #include "server/execution/guarded.h"
 #include "server/service/status_mapping.h"
+#include "server/service/stream_admission.h"
 
 namespace polyest::internal {
 
@@ -56,15 +57,7 @@ WatchFlow::WatchFlow(ServiceContext& context, grpc::CallbackServerContext& call)
       call_(call),
       stop_(call, stop_source_.get_token(), context.max_computing) {}
 
-absl::StatusOr<Caller> WatchFlow::Authorize() const {
-  POLYEST_ASSIGN_OR_RETURN(Caller caller, context_.access.Authorize(call_, "WatchSession"));
-  if (session_ != nullptr && session_->tenant() != caller.tenant) {
-    return absl::PermissionDeniedError("the token is another tenant's now");
-  }
-  return caller;
-}
-
-void WatchFlow::OnStart(WatchReactor* reactor, const absl::Status& admitted,
+void WatchFlow::OnStart(WatchReactor* reactor, const absl::StatusOr<Caller>& admitted,
                         const v1::WatchSessionRequest& request) {
   std::lock_guard lock(mutex_);
   reactor_ = reactor;
@@ -72,16 +65,15 @@ void WatchFlow::OnStart(WatchReactor* reactor, const absl::Status& admitted,
     wanted_ = ToPredictRequest(request.prediction());
     interval_ = IntervalOf(request.prediction());
   }
-  absl::Status attached = admitted;
+  absl::Status attached = admitted.status();
   if (attached.ok()) attached = CheckPolicy(request.prediction());
-  if (attached.ok()) attached = Attach(request);
+  if (attached.ok()) attached = Attach(*admitted, request);
   if (!attached.ok()) End(attached);
   Advance();
 }
 
-absl::Status WatchFlow::Attach(const v1::WatchSessionRequest& request) {
+absl::Status WatchFlow::Attach(const Caller& caller, const v1::WatchSessionRequest& request) {
   const std::string& session = request.session();
-  POLYEST_ASSIGN_OR_RETURN(const Caller caller, Authorize());
   POLYEST_RETURN_IF_ERROR(ResourceId("session", "sessions", session).status());
   registering_ = true;
   if (context_.sessions.shared()) {
@@ -140,7 +132,8 @@ void WatchFlow::Register() {
 void WatchFlow::OnEstimate(const SharedEstimate& estimate) {
   std::lock_guard lock(mutex_);
   if (end_ || reactor_ == nullptr || estimate == last_) return;
-  const absl::Status allowed = Authorize().status();
+  const absl::Status allowed =
+      AuthorizeStream(context_, call_, "WatchSession", session_.get()).status();
   if (allowed.ok()) {
     pending_ = last_ = estimate;
     PredictIfDue();
@@ -256,14 +249,9 @@ void WatchFlow::OnDone() {
 SessionWatch::SessionWatch(ServiceContext& context, grpc::CallbackServerContext& call,
                            const v1::WatchSessionRequest& request)
     : flow_(std::make_shared<WatchFlow>(context, call)) {
-  const absl::StatusOr<Caller> caller = flow_->Authorize();
-  absl::Status admitted = caller.status();
-  if (admitted.ok()) {
-    auto ticket = context.calls.Enter(OpenCalls::Kind::kWatcher, caller->tenant, flow_);
-    admitted = ticket.status();
-    if (admitted.ok()) ticket_ = *std::move(ticket);
-  }
-  flow_->OnStart(this, admitted, request);
+  flow_->OnStart(
+      this, AdmitStream(context, call, "WatchSession", OpenCalls::Kind::kWatcher, flow_, ticket_),
+      request);
 }
 
 void SessionWatch::OnDone() {

@@ -30,11 +30,7 @@ class WatchFlow final : public SessionObserver,
  public:
   WatchFlow(ServiceContext& context, grpc::CallbackServerContext& call);
 
-  // Checks that the caller may watch the session. This is asked again for each estimate, because a
-  // token may be revoked while the watch is open.
-  absl::StatusOr<Caller> Authorize() const;
-
-  void OnStart(WatchReactor* reactor, const absl::Status& admitted,
+  void OnStart(WatchReactor* reactor, const absl::StatusOr<Caller>& admitted,
                const v1::WatchSessionRequest& request);
   void OnWritten(bool ok);
   void OnCancelled();
@@ -49,7 +45,7 @@ class WatchFlow final : public SessionObserver,
   using Clock = std::chrono::steady_clock;
 
   // The following are called with the mutex held.
-  absl::Status Attach(const v1::WatchSessionRequest& request);
+  absl::Status Attach(const Caller& caller, const v1::WatchSessionRequest& request);
   void End(const absl::Status& status);
   void Advance();
   void PredictIfDue();
