@@ -1,6 +1,5 @@
 #include "server/web/shared_watch.h"
 
-#include <chrono>
 #include <exception>
 #include <utility>
 
@@ -15,8 +14,6 @@ constexpr int kNoClient = -1;
 // Largest prediction that is kept for clients who come later, bytes: it may have millions of
 // numbers.
 constexpr size_t kLargest = size_t{64} << 10;
-// The call ends when its last client goes.
-constexpr std::chrono::hours kForever{24 * 365};
 
 }  // namespace
 
@@ -76,7 +73,8 @@ void SharedWatch::Read() {
 }
 
 grpc::Status SharedWatch::ReadAll() {
-  while (call_.Await(kNoClient, WebCall::Clock::now() + kForever) == WebCall::Event::kMessage) {
+  while (call_.Await(kNoClient, WebCall::Clock::now() + WebCall::kForever) ==
+         WebCall::Event::kMessage) {
     const std::string bytes = call_.TakeMessage();
     v1::WatchSessionResponse response;
     const auto event = ToEvent(bytes, *response.GetDescriptor());

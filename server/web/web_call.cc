@@ -12,12 +12,6 @@
 #include "server/telemetry/request_id.h"
 
 namespace polyest::internal {
-namespace {
-
-// Longest time of a call without a limit of its own; its client is watched all the time.
-constexpr std::chrono::hours kForever{24 * 365};
-
-}  // namespace
 
 // Receives what happens to the call on gRPC's threads. A hold keeps gRPC from ending the call while
 // the next read may be started from another thread.

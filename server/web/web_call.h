@@ -23,6 +23,9 @@ class WebCall {
  public:
   using Clock = std::chrono::steady_clock;
 
+  // Longest time of a call without a limit of its own; its client is watched all the time.
+  static constexpr std::chrono::hours kForever{24 * 365};
+
   struct Request {
     std::string method;  // "/polyest.v1.SessionService/GetSession"
     std::vector<std::pair<std::string, std::string>> metadata{};
