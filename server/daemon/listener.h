@@ -6,7 +6,6 @@
 
 #include <absl/status/statusor.h>
 #include <grpcpp/server_builder.h>
-#include <netdb.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
 
@@ -18,13 +17,12 @@
 #include <memory>
 #include <mutex>
 #include <set>
-#include <stop_token>
 #include <string>
 #include <thread>
-#include <vector>
 
 #include "server/daemon/connection_table.h"
 #include "server/daemon/listen_address.h"
+#include "server/net/listening_sockets.h"
 #include "server/telemetry/log_limit.h"
 
 namespace polyest::internal {
@@ -76,30 +74,17 @@ class Listener {
   const ConnectionLimits& limits() const { return options_.limits; }
 
  private:
-  // Closes a descriptor when it goes.
-  struct Socket {
-    explicit Socket(int descriptor) : number(descriptor) {}
-    ~Socket();
-    Socket(const Socket&) = delete;
-    Socket& operator=(const Socket&) = delete;
-    const int number;
-  };
-
-  // Listens on one address and sets `port` to the one that it got; returns 0, or the system's
-  // error.
-  int Bind(const sockaddr* address, socklen_t size, int& port);
-  // Does so on all of these addresses that the machine has, or on none.
-  int BindAll(const addrinfo* addresses, int& port);
-  void Run(std::stop_token stop);
-  void Accept(int socket);
+  void Run();
+  void Take(int connection, const sockaddr_storage& from);
   bool TakeOwn(int connection, const std::string& from);
   // Hands a connection to gRPC.
   void Pass(int connection);
   void Refuse(int connection, const std::string& peer, const char* why);
-  bool DialOne(int socket, std::chrono::steady_clock::time_point deadline, bool http2);
+  bool DialOne(const sockaddr_storage& address, std::chrono::steady_clock::time_point deadline,
+               bool http2);
 
   const Options options_;
-  std::vector<std::unique_ptr<Socket>> sockets_;
+  ListeningSockets sockets_;
   std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> acceptor_;
   ConnectionTable connections_;
   std::atomic<int64_t> refused_ = 0;
@@ -112,8 +97,7 @@ class Listener {
   std::set<std::string> own_accepted_;
   std::condition_variable own_changed_;
 
-  std::unique_ptr<Socket> wake_;  // an eventfd, which ends the wait for connections
-  std::jthread thread_;
+  std::thread thread_;
 };
 
 }  // namespace polyest::internal

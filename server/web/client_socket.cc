@@ -2,8 +2,6 @@
 
 #include <absl/strings/escaping.h>
 #include <absl/strings/str_cat.h>
-#include <arpa/inet.h>
-#include <netinet/in.h>
 #include <openssl/err.h>
 #include <openssl/ssl.h>
 #include <openssl/x509.h>
@@ -14,6 +12,8 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdint>
+
+#include "server/net/socket_address.h"
 
 namespace polyest::internal {
 namespace {
@@ -33,36 +33,11 @@ bool Await(int descriptor, int16_t events, Clock::time_point deadline, int stop 
   }
 }
 
-// An address of a socket.
-struct Address {
-  std::string host;  // empty: not one of IP
-  int port = 0;
-  bool ipv6 = false;
-};
-
-Address ToAddress(const sockaddr_storage& from) {
-  char text[INET6_ADDRSTRLEN] = {};
-  if (from.ss_family == AF_INET) {
-    const auto& ipv4 = reinterpret_cast<const sockaddr_in&>(from);
-    inet_ntop(AF_INET, &ipv4.sin_addr, text, sizeof(text));
-    return {text, ntohs(ipv4.sin_port), false};
-  }
-  if (from.ss_family != AF_INET6) return {};
-  const auto& ipv6 = reinterpret_cast<const sockaddr_in6&>(from);
-  const int port = ntohs(ipv6.sin6_port);
-  if (IN6_IS_ADDR_V4MAPPED(&ipv6.sin6_addr)) {
-    inet_ntop(AF_INET, &ipv6.sin6_addr.s6_addr[12], text, sizeof(text));
-    return {text, port, false};
-  }
-  inet_ntop(AF_INET6, &ipv6.sin6_addr, text, sizeof(text));
-  return {text, port, true};
-}
-
-Address PeerOf(int descriptor) {
+IpAddress PeerOf(int descriptor) {
   sockaddr_storage address{};
   socklen_t size = sizeof(address);
   if (getpeername(descriptor, reinterpret_cast<sockaddr*>(&address), &size) != 0) return {};
-  return ToAddress(address);
+  return ToIpAddress(address);
 }
 
 }  // namespace
@@ -157,7 +132,7 @@ void ClientSocket::FinishWriting(Clock::time_point deadline) {
 void ClientSocket::Shutdown() const { shutdown(descriptor_, SHUT_RDWR); }
 
 std::string ClientSocket::Peer() const {
-  const Address peer = PeerOf(descriptor_);
+  const IpAddress peer = PeerOf(descriptor_);
   if (peer.host.empty()) return "unknown";
   if (peer.ipv6) return absl::StrCat("ipv6:[", peer.host, "]:", peer.port);
   return absl::StrCat("ipv4:", peer.host, ":", peer.port);
@@ -169,7 +144,7 @@ std::string ClientSocket::LocalHost() const {
   sockaddr_storage address{};
   socklen_t size = sizeof(address);
   if (getsockname(descriptor_, reinterpret_cast<sockaddr*>(&address), &size) != 0) return "";
-  const Address local = ToAddress(address);
+  const IpAddress local = ToIpAddress(address);
   return local.ipv6 ? absl::StrCat("[", local.host, "]") : local.host;
 }
 

@@ -20,6 +20,15 @@ constexpr std::string_view kFull =
     "Connection: close\r\nContent-Length: 73\r\n\r\n"
     R"({"code":8,"message":"too many connections; try again later","details":[]})";
 
+// Bytes that the kernel holds of what a client does not read: a slow one does not fall far behind.
+constexpr int kSendBuffer = 128 << 10;
+
+void Prepare(int connection) {
+  const int on = 1;
+  setsockopt(connection, SOL_SOCKET, SO_KEEPALIVE, &on, sizeof(on));
+  setsockopt(connection, SOL_SOCKET, SO_SNDBUF, &kSendBuffer, sizeof(kSendBuffer));
+}
+
 // Says that there is no room, as far as that is possible without waiting. What the client has sent
 // is read, because the answer would be lost otherwise.
 void RefuseConnection(int descriptor) {
@@ -32,13 +41,13 @@ void RefuseConnection(int descriptor) {
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<WebServer>> WebServer::Open(const Options& options) {
-  POLYEST_ASSIGN_OR_RETURN(auto socket,
-                           ListeningSocket::Open(options.option, options.host, options.port));
-  return std::unique_ptr<WebServer>(new WebServer(options, std::move(socket)));
+  std::unique_ptr<WebServer> server(new WebServer(options));
+  POLYEST_RETURN_IF_ERROR(server->sockets_.Listen(options.option, options.host, server->port_));
+  return server;
 }
 
-WebServer::WebServer(const Options& options, std::unique_ptr<ListeningSocket> socket)
-    : options_(options), socket_(std::move(socket)), memory_(options.body_memory_bytes) {}
+WebServer::WebServer(const Options& options)
+    : options_(options), port_(options.port), memory_(options.body_memory_bytes) {}
 
 WebServer::~WebServer() { Stop(std::chrono::steady_clock::now()); }
 
@@ -52,7 +61,10 @@ void WebServer::Serve(const HttpHandler& handler) {
 }
 
 void WebServer::AcceptAll(const HttpHandler& handler) {
-  for (int descriptor = socket_->Accept(); descriptor >= 0; descriptor = socket_->Accept()) {
+  while (true) {
+    const int descriptor = sockets_.Accept().descriptor;
+    if (descriptor < 0) return;
+    Prepare(descriptor);
     Reap();
     Take(descriptor, handler);
   }
@@ -94,7 +106,7 @@ bool WebServer::Start(Connections& taken, const HttpHandler& handler) {
 }
 
 void WebServer::Run(Connections::iterator connection, const HttpHandler& handler) {
-  ServeConnection(*connection->socket, socket_->stop_descriptor(), options_.http, memory_, handler);
+  ServeConnection(*connection->socket, sockets_.stop_descriptor(), options_.http, memory_, handler);
   const std::lock_guard lock(mutex_);
   connection->socket.reset();
   const auto host = hosts_.find(connection->host);
@@ -113,7 +125,7 @@ void WebServer::Reap() {
 }
 
 void WebServer::Stop(std::chrono::steady_clock::time_point deadline) {
-  socket_->Stop();
+  sockets_.Stop();
   if (accepting_.joinable()) accepting_.join();
   {
     std::unique_lock lock(mutex_);

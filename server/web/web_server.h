@@ -16,9 +16,9 @@
 #include <thread>
 #include <utility>
 
+#include "server/net/listening_sockets.h"
 #include "server/web/client_socket.h"
 #include "server/web/http_connection.h"
-#include "server/web/listening_socket.h"
 
 namespace polyest::internal {
 
@@ -39,7 +39,7 @@ class WebServer {
   // Stops, if that was not done.
   ~WebServer();
 
-  int port() const { return socket_->port(); }
+  int port() const { return port_; }
   // Sets the encryption of connections to come; null: none.
   void UseTls(std::shared_ptr<SSL_CTX> tls);
   // Begins to serve. `handler` must outlive the server, or Stop.
@@ -56,7 +56,7 @@ class WebServer {
   };
   using Connections = std::list<Connection>;
 
-  WebServer(const Options& options, std::unique_ptr<ListeningSocket> socket);
+  explicit WebServer(const Options& options);
   void AcceptAll(const HttpHandler& handler);
   // Serves a connection, or refuses it when there are too many.
   void Take(int descriptor, const HttpHandler& handler);
@@ -68,7 +68,8 @@ class WebServer {
   void Reap();
 
   const Options options_;
-  const std::unique_ptr<ListeningSocket> socket_;
+  ListeningSockets sockets_;
+  int port_;
   BodyMemory memory_;
   std::mutex mutex_;
   std::condition_variable ended_;
