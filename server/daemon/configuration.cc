@@ -1,5 +1,7 @@
 #include "server/daemon/configuration.h"
 
+#include <absl/strings/str_replace.h>
+
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdlib>
@@ -16,11 +18,6 @@ const std::string kVariablePrefix = "POLYESTD_";
 std::string Variable(const std::string& name) {
   const char* value = std::getenv(name.c_str());
   return value == nullptr ? "" : value;
-}
-
-std::string OneLine(std::string text) {
-  std::replace(text.begin(), text.end(), '\n', ' ');
-  return text;
 }
 
 // Reads a file whose keys are options. Leaves out those that the environment sets, because CLI11
@@ -112,7 +109,7 @@ void AddConfiguration(CLI::App& app, const std::vector<std::string>& flags_only)
 
 std::string DescribeError(const CLI::App& app, const CLI::ParseError& error, int argc,
                           const char* const* argv) {
-  const std::string what = OneLine(error.what());
+  const std::string what = absl::StrReplaceAll(error.what(), {{"\n", " "}});
   std::string file;
   const CLI::Option* const config = app.get_config_ptr();
   if (config != nullptr && !config->results().empty()) {

@@ -1,6 +1,8 @@
 #include "server/journal/postgres_connection.h"
 
+#include <absl/strings/ascii.h>
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_replace.h>
 #include <poll.h>
 #include <spdlog/spdlog.h>
 
@@ -71,15 +73,6 @@ std::string ArrayOf(const std::vector<int64_t>& elements) {
     AppendBigEndian(static_cast<uint64_t>(element), 8, bytes);
   }
   return bytes;
-}
-
-std::string OneLine(const char* text) {
-  std::string line = text;
-  while (!line.empty() && line.back() == '\n') line.pop_back();
-  for (char& c : line) {
-    if (c == '\n') c = ' ';
-  }
-  return line;
 }
 
 }  // namespace
@@ -197,7 +190,8 @@ absl::Status PostgresConnection::SetUp() {
 
 absl::Status PostgresConnection::Broken(std::string_view what) {
   broken_ = true;
-  const std::string said = OneLine(Libpq().PQerrorMessage(connection_));
+  const std::string said = absl::StrReplaceAll(
+      absl::StripTrailingAsciiWhitespace(Libpq().PQerrorMessage(connection_)), {{"\n", " "}});
   spdlog::warn("the database that keeps the sessions: {}{}{}", what, said.empty() ? "" : ": ",
                said);
   return DatabaseAway(what);
