@@ -54,9 +54,7 @@ class PostgresJournal final : public SessionJournal, public SharedJournal {
                                                     const std::string& name) const override;
   int64_t node() const override { return node_->number(); }
   absl::StatusOr<std::vector<JournalNode>> Nodes() const override { return ReadNodes(*pool_); }
-  absl::Status DrainNode(int64_t node) override {
-    return polyest::internal::DrainNode(*pool_, node);
-  }
+  absl::Status DrainNode(int64_t node) override { return MarkDraining(*pool_, node); }
   void StartDraining() override { node_->StartDraining(); }
   bool AwaitDraining(std::stop_token stop) override { return node_->AwaitDraining(stop); }
   absl::Status CheckWritable() override;

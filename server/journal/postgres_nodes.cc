@@ -46,7 +46,7 @@ absl::StatusOr<std::string> FindTaker(PostgresPool& pool, int64_t node) {
   return taker.rows() == 0 ? std::string() : taker.Bytes(0, 0);
 }
 
-absl::Status DrainNode(PostgresPool& pool, int64_t node) {
+absl::Status MarkDraining(PostgresPool& pool, int64_t node) {
   POLYEST_ASSIGN_OR_RETURN(const std::string taker, FindTaker(pool, node));
   if (taker.empty()) {
     return absl::FailedPreconditionError(

@@ -13,9 +13,9 @@
 
 namespace polyest::internal {
 
-// As SharedJournal does.
+// Do what SharedJournal's Nodes and DrainNode do.
 absl::StatusOr<std::vector<JournalNode>> ReadNodes(PostgresPool& pool);
-absl::Status DrainNode(PostgresPool& pool, int64_t node);
+absl::Status MarkDraining(PostgresPool& pool, int64_t node);
 
 // Returns the address of the node with the fewest sessions that may take those of `node`; empty if
 // there is none.

@@ -124,7 +124,7 @@ absl::StatusOr<Caller> AccessControl::Authorize(const grpc::ServerContextBase& c
 }
 
 bool AccessControl::IsPassedOn(const grpc::ServerContextBase& call) const {
-  return options_.nodes && polyest::internal::IsPassedOn(call, *options_.nodes);
+  return options_.nodes && IsPassedOnWith(call, *options_.nodes);
 }
 
 std::vector<std::pair<std::string, std::string>> AccessControl::PassOn(
@@ -144,7 +144,7 @@ std::string AccessControl::PeerOf(const grpc::ServerContextBase& call) const {
   if (IsPassedOn(call)) return CallerPassedOn(call).peer;
   const std::optional<std::string> forwarded =
       options_.behind_edge && IsFromEdge(call) ? EdgeHeader(call, kForwardedForKey) : std::nullopt;
-  return forwarded ? absl::StrCat("edge:", *forwarded) : polyest::internal::PeerOf(call);
+  return forwarded ? absl::StrCat("edge:", *forwarded) : ClientAddressOf(call);
 }
 
 }  // namespace polyest::internal

@@ -41,7 +41,7 @@ std::vector<std::pair<std::string, std::string>> MetadataOf(const WebClient& cli
   return metadata;
 }
 
-std::string PeerOf(const grpc::ServerContextBase& call) {
+std::string ClientAddressOf(const grpc::ServerContextBase& call) {
   const std::string peer = BelievedValue(call, kPeerKey);
   return peer.empty() ? call.peer() : peer;
 }

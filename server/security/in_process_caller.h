@@ -21,7 +21,7 @@ struct WebClient {
 std::vector<std::pair<std::string, std::string>> MetadataOf(const WebClient& client);
 
 // Returns the address of the client for whom a call is made, be it by gRPC or over HTTP.
-std::string PeerOf(const grpc::ServerContextBase& call);
+std::string ClientAddressOf(const grpc::ServerContextBase& call);
 
 // Returns the common name of the certificate of the HTTP client for whom a call is made; empty for
 // a call that comes by gRPC.

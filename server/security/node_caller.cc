@@ -46,7 +46,7 @@ bool ClaimsToBePassedOn(const grpc::ServerContextBase& call) {
   return call.client_metadata().count(kNodeSecretKey) > 0;
 }
 
-bool IsPassedOn(const grpc::ServerContextBase& call, const NodeSecret& secret) {
+bool IsPassedOnWith(const grpc::ServerContextBase& call, const NodeSecret& secret) {
   const std::string claimed = OnlyValue(call, kNodeSecretKey);
   return !claimed.empty() && secret.IsSame(claimed);
 }

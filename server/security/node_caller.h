@@ -47,7 +47,7 @@ std::vector<std::pair<std::string, std::string>> MetadataOf(const NodeCaller& ca
 bool ClaimsToBePassedOn(const grpc::ServerContextBase& call);
 
 // Returns whether another daemon that knows the secret has passed the call on.
-bool IsPassedOn(const grpc::ServerContextBase& call, const NodeSecret& secret);
+bool IsPassedOnWith(const grpc::ServerContextBase& call, const NodeSecret& secret);
 
 // Returns the caller of a call that has been passed on.
 NodeCaller CallerPassedOn(const grpc::ServerContextBase& call);

@@ -146,16 +146,17 @@ void WatchFlow::OnEstimate(const SharedEstimate& estimate) {
 void WatchFlow::PredictIfDue() {
   if (!wanted_ || predicting_ || Clock::now() < due_) return;
   // When the executor is full, a later estimate tries again.
-  predicting_ = session_->strand().Submit([flow = shared_from_this()] { flow->Predict(); }).ok();
+  predicting_ =
+      session_->strand().Submit([flow = shared_from_this()] { flow->ComputePrediction(); }).ok();
 }
 
-void WatchFlow::Predict() {
+void WatchFlow::ComputePrediction() {
   const Clock::time_point begin = Clock::now();
   // Processing and predicting are one piece of work.
   const Stop stop = stop_.Begin();
   v1::PredictResponse prediction;
   const auto predict = [&](Estimator& estimator, int64_t sequence) -> absl::Status {
-    POLYEST_ASSIGN_OR_RETURN(prediction, polyest::internal::Predict(*wanted_, estimator, stop));
+    POLYEST_ASSIGN_OR_RETURN(prediction, Predict(*wanted_, estimator, stop));
     prediction.set_sequence(sequence);
     return absl::OkStatus();
   };

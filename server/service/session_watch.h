@@ -51,7 +51,7 @@ class WatchFlow final : public SessionObserver,
   void PredictIfDue();
 
   // Computes a prediction; runs on the strand.
-  void Predict();
+  void ComputePrediction();
   // Looks for the session; runs where a thread may wait for that.
   void Find(const std::string& tenant, const v1::WatchSessionRequest& request);
   // Passes the watch on to the owner of its session, if `refusal` names one that may be asked.
