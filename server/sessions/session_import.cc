@@ -52,6 +52,16 @@ absl::Status SessionImport::Begin(const std::string& id, const v1::SessionRecord
   if (loaded_ != nullptr) {
     return InvalidField("record.head", "there is one already; batches follow it");
   }
+  POLYEST_RETURN_IF_ERROR(TakeHead(id, head));
+  v1::Problem problem;
+  if (!problem.ParseFromString(head.problem())) {
+    return InvalidField("record.head.problem", "must be a serialized Problem");
+  }
+  problem.clear_schema();
+  return Store(problem, stop);
+}
+
+absl::Status SessionImport::TakeHead(const std::string& id, const v1::SessionRecord::Head& head) {
   head_.name = id.empty() ? head.name() : absl::StrCat("sessions/", id);
   const std::string prefix = "sessions/";
   if (!head_.name.starts_with(prefix)) {
@@ -75,11 +85,10 @@ absl::Status SessionImport::Begin(const std::string& id, const v1::SessionRecord
   }
   head_.create_time = head.create_time();
   promised_ = head.batch_count();
-  v1::Problem problem;
-  if (!problem.ParseFromString(head.problem())) {
-    return InvalidField("record.head.problem", "must be a serialized Problem");
-  }
-  problem.clear_schema();
+  return absl::OkStatus();
+}
+
+absl::Status SessionImport::Store(const v1::Problem& problem, const Stop& stop) {
   const SessionServices& services = registry_.services();
   const auto check_memory = [&](int64_t bytes) {
     return services.tenant_memory->MakeRoom(head_.tenant, bytes);

@@ -36,6 +36,10 @@ class SessionImport {
 
  private:
   absl::Status Begin(const std::string& id, const v1::SessionRecord::Head& head, const Stop& stop);
+  // Takes what a head says of the session, but for its problem.
+  absl::Status TakeHead(const std::string& id, const v1::SessionRecord::Head& head);
+  // Puts the session into the journal, hidden, and loads it.
+  absl::Status Store(const v1::Problem& problem, const Stop& stop);
   absl::Status Append(const v1::SessionRecord::Batch& batch);
   absl::Status Remember(const v1::SessionRecord::PastEstimate& past);
 

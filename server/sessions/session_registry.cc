@@ -85,14 +85,20 @@ absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Create(const std::stri
   // The address of the schema is for editors, and may be of any length.
   v1::Problem kept = problem;
   kept.clear_schema();
-  auto number = services_.journal.Create(head, kept, /*hidden=*/false);
+  POLYEST_RETURN_IF_ERROR(Store(kept, /*choose_name=*/id.empty(), head));
+  return Adopt(std::move(head), std::move(loaded));
+}
+
+absl::Status SessionRegistry::Store(const v1::Problem& problem, bool choose_name,
+                                    SessionHead& head) {
+  auto number = services_.journal.Create(head, problem, /*hidden=*/false);
   // Another daemon may have chosen the same name.
-  while (id.empty() && absl::IsAlreadyExists(number.status())) {
+  while (choose_name && absl::IsAlreadyExists(number.status())) {
     {
       const std::lock_guard lock(mutex_);
-      head.name = ChooseName(tenant);
+      head.name = ChooseName(head.tenant);
     }
-    number = services_.journal.Create(head, kept, /*hidden=*/false);
+    number = services_.journal.Create(head, problem, /*hidden=*/false);
   }
   if (absl::IsAlreadyExists(number.status())) {
     return absl::AlreadyExistsError(
@@ -100,13 +106,10 @@ absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Create(const std::stri
   }
   POLYEST_RETURN_IF_ERROR(number.status());
   head.number = *number;
-  const auto bytes = static_cast<int64_t>(DeterministicBytes(kept).size());
-  const absl::Status room = services_.stored->Take(*number, tenant, {0, bytes});
-  if (!room.ok()) {
-    services_.journal.Delete(*number).IgnoreError();
-    return room;
-  }
-  return Adopt(std::move(head), std::move(loaded));
+  const auto bytes = static_cast<int64_t>(DeterministicBytes(problem).size());
+  const absl::Status room = services_.stored->Take(head.number, head.tenant, {0, bytes});
+  if (!room.ok()) services_.journal.Delete(head.number).IgnoreError();
+  return room;
 }
 
 absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Adopt(

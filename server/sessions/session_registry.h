@@ -78,6 +78,9 @@ class SessionRegistry {
   std::shared_ptr<Session> Follow(SessionHead head);
   // Forgets a session that another daemon has deleted.
   void Forget(const Key& key);
+  // Puts a new session into the journal, which sets its number, and takes room for its problem.
+  // With `choose_name`, gives the session another name where its own is taken.
+  absl::Status Store(const v1::Problem& problem, bool choose_name, SessionHead& head);
   // Adds a session, unless it has been added already; returns the one that is there.
   absl::StatusOr<std::shared_ptr<Session>> Add(const Key& key, std::shared_ptr<Session> session);
   // The following are called with the mutex held.
