@@ -7,6 +7,9 @@
 
 #include <atomic>
 #include <barrier>
+#include <chrono>
+#include <condition_variable>
+#include <mutex>
 #include <set>
 #include <stdexcept>
 #include <thread>
@@ -25,19 +28,42 @@ std::set<std::thread::id> ThreadsOf(ThreadPool& pool, int items, int threads) {
   return {of_item.begin(), of_item.end()};
 }
 
+// Where items meet that run at the same time.
+class Meeting {
+ public:
+  explicit Meeting(int items) : awaited_(items) {}
+
+  // Waits for the other items; returns whether all come.
+  bool Await() {
+    std::unique_lock lock(mutex_);
+    --awaited_;
+    came_.notify_all();
+    return came_.wait_for(lock, std::chrono::minutes(1), [this] { return awaited_ == 0; });
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable came_;
+  int awaited_;
+};
+
+// Returns whether a loop does so many items at the same time.
+bool DoesAtOnce(ThreadPool& pool, int items) {
+  Meeting meeting(items);
+  std::atomic<int> met{0};
+  pool.Run(items, items, [&](int) { met += meeting.Await() ? 1 : 0; });
+  return met == items;
+}
+
 TEST(ThreadPool, HelpsOnAllCores) {
   ThreadPool pool(3);
-  std::barrier<> met(3);
-  for (int loop = 0; loop < 20; ++loop) {
-    pool.Run(3, 3, [&](int) { met.arrive_and_wait(); });
-  }
+  for (int loop = 0; loop < 20; ++loop) ASSERT_TRUE(DoesAtOnce(pool, 3));
 }
 
 // The threads wait for something other than a core, such as another machine.
 TEST(ThreadPool, HelpsWithMoreThreadsThanCoresIfAsked) {
   ThreadPool pool(1);
-  std::barrier<> met(4);
-  pool.Run(4, 4, [&](int) { met.arrive_and_wait(); });
+  EXPECT_TRUE(DoesAtOnce(pool, 4));
 }
 
 TEST(ThreadPool, UsesNoMoreThreadsThanAsked) {
@@ -60,8 +86,7 @@ TEST(ThreadPool, LeavesACoreToEachThreadThatComputes) {
   }
   done.arrive_and_wait();
   other.join();
-  std::barrier<> met(2);
-  pool.Run(2, 2, [&](int) { met.arrive_and_wait(); });
+  EXPECT_TRUE(DoesAtOnce(pool, 2));
 }
 
 TEST(ThreadPool, ServesLoopsWithinLoopsAndSideBySide) {
@@ -79,13 +104,13 @@ TEST(ThreadPool, ServesLoopsWithinLoopsAndSideBySide) {
 
 TEST(ThreadPool, GoesOnAfterAnException) {
   ThreadPool pool(3);
-  std::barrier<> met(3);
+  Meeting meeting(3);
   const auto fails = [&](int item) {
-    met.arrive_and_wait();  // on all threads
+    EXPECT_TRUE(meeting.Await());  // on all threads
     if (item > 0) throw std::runtime_error("an item");
   };
   EXPECT_THROW(pool.Run(3, 3, fails), std::runtime_error);
-  pool.Run(3, 3, [&](int) { met.arrive_and_wait(); });
+  EXPECT_TRUE(DoesAtOnce(pool, 3));
 }
 
 }  // namespace

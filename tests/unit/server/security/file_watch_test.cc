@@ -2,13 +2,18 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <filesystem>
 #include <future>
+#include <optional>
+#include <utility>
 
 #include "tests/testing/test_folder.h"
 
 namespace polyest::internal {
 namespace {
+
+constexpr std::chrono::minutes kPatience{1};
 
 TEST(FileChanges, TellsAChangeOnceWhenItHasSettled) {
   const TestFolder folder;
@@ -54,12 +59,15 @@ TEST(FileWatch, CallsBackAndEnds) {
   std::promise<void> changed;
   const FileWatch watch(std::move(changes), std::chrono::milliseconds(1),
                         [&changed] { changed.set_value(); });
-  changed.get_future().wait();
+  EXPECT_EQ(changed.get_future().wait_for(kPatience), std::future_status::ready);
 }
 
 TEST(FileWatch, EndsWithoutWaitingForItsNextLook) {
   const TestFolder folder;
-  const FileWatch watch(FileChanges({folder.Write("tokens", "a")}), std::chrono::hours(1), [] {});
+  std::optional<FileWatch> watch(std::in_place, FileChanges({folder.Write("tokens", "a")}),
+                                 std::chrono::hours(1), [] {});
+  const auto ended = std::async(std::launch::async, [&watch] { watch.reset(); });
+  EXPECT_EQ(ended.wait_for(kPatience), std::future_status::ready);
 }
 
 }  // namespace

@@ -5,8 +5,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <chrono>
 #include <filesystem>
 #include <fstream>
+#include <future>
 #include <sstream>
 #include <thread>
 
@@ -17,6 +20,8 @@ namespace {
 
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
+
+constexpr std::chrono::minutes kPatience{1};
 
 google::protobuf::Timestamp NewYear() {
   google::protobuf::Timestamp time;
@@ -32,9 +37,14 @@ class AuditLogTest : public testing::Test {
     text << in.rdbuf();
     return text.str();
   }
-  // Waits until the file has the text; the test's own time limit ends a failure.
-  static void Await(const std::string& file, const std::string& text) {
-    while (Read(file).find(text) == std::string::npos) std::this_thread::yield();
+  // Returns whether the file comes to have the text.
+  static bool Await(const std::string& file, const std::string& text) {
+    const auto deadline = std::chrono::steady_clock::now() + kPatience;
+    while (Read(file).find(text) == std::string::npos) {
+      if (std::chrono::steady_clock::now() > deadline) return false;
+      std::this_thread::yield();
+    }
+    return true;
   }
 
   const TestFolder folder_;
@@ -62,15 +72,15 @@ TEST_F(AuditLogTest, HasALineForEachEventForItsOwnerOnly) {
 TEST_F(AuditLogTest, GoesOnInANewFileAfterRotation) {
   const auto audit = AuditLog::Open(file_, NewYear).value();
   audit->Add("first", {});
-  Await(file_, "first");
+  ASSERT_TRUE(Await(file_, "first"));
   fs::rename(file_, file_ + ".1");
   audit->Add("second", {});
-  Await(file_, "second");
+  ASSERT_TRUE(Await(file_, "second"));
   fs::copy(file_, file_ + ".2");
   fs::remove(file_);
   audit->Reopen();
   audit->Add("third", {});
-  Await(file_, "third");
+  ASSERT_TRUE(Await(file_, "third"));
   EXPECT_THAT(Read(file_ + ".1"), HasSubstr("first"));
   EXPECT_THAT(Read(file_), testing::Not(HasSubstr("second")));
 }
@@ -82,7 +92,7 @@ TEST_F(AuditLogTest, WaitsForAFullDiskAndCountsWhatItCouldNotHold) {
     for (size_t i = 0; i < AuditLog::kMaxLines + 7; ++i) audit->Add("call", {});
     // Somebody makes room.
     fs::remove(file_);
-    Await(file_, "lines lost");
+    ASSERT_TRUE(Await(file_, "lines lost"));
   }
   const std::string text = Read(file_);
   EXPECT_EQ(static_cast<size_t>(std::count(text.begin(), text.end(), '\n')),
@@ -92,7 +102,10 @@ TEST_F(AuditLogTest, WaitsForAFullDiskAndCountsWhatItCouldNotHold) {
 
 TEST_F(AuditLogTest, EndsThoughTheDiskIsFull) {
   fs::create_symlink("/dev/full", file_);
-  AuditLog::Open(file_, NewYear).value()->Add("call", {});
+  auto audit = AuditLog::Open(file_, NewYear).value();
+  audit->Add("call", {});
+  const auto ended = std::async(std::launch::async, [&audit] { audit = nullptr; });
+  EXPECT_EQ(ended.wait_for(kPatience), std::future_status::ready);
 }
 
 TEST_F(AuditLogTest, NamesAFileThatItCannotWrite) {

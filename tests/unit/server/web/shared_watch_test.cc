@@ -4,6 +4,7 @@
 #include <grpcpp/server.h>
 #include <grpcpp/server_builder.h>
 
+#include <chrono>
 #include <condition_variable>
 #include <deque>
 #include <mutex>
@@ -16,6 +17,8 @@ namespace polyest::internal {
 namespace {
 
 using Event = WebCall::Event;
+
+constexpr std::chrono::minutes kPatience{1};
 
 v1::WatchSessionResponse EstimateOf(int64_t sequence) {
   v1::WatchSessionResponse response;
@@ -60,15 +63,15 @@ class Watched final : public v1::SessionService::Service {
     ended_ = true;
     changed_.notify_all();
   }
-  // Waits until so many calls have begun.
-  void AwaitCalls(int calls) {
+  // Returns whether so many calls begin.
+  bool AwaitCalls(int calls) {
     std::unique_lock lock(mutex_);
-    changed_.wait(lock, [&] { return calls_ == calls; });
+    return changed_.wait_for(lock, kPatience, [&] { return calls_ == calls; });
   }
-  // Waits until so many calls have ended.
-  void AwaitEnds(int calls) {
+  // Returns whether so many calls end.
+  bool AwaitEnds(int calls) {
     std::unique_lock lock(mutex_);
-    changed_.wait(lock, [&] { return ends_ == calls; });
+    return changed_.wait_for(lock, kPatience, [&] { return ends_ == calls; });
   }
   int calls() const {
     const std::lock_guard lock(mutex_);
@@ -97,7 +100,7 @@ class SharedWatchTest : public ::testing::Test {
     return watches_->Join({who}, {.method = PathOf("WatchSession")});
   }
   static Event Await(EventSource& client) {
-    return client.Await(-1, WebCall::Clock::now() + std::chrono::minutes(1));
+    return client.Await(-1, WebCall::Clock::now() + kPatience);
   }
   // Returns the next message of a client, which must come.
   static std::string Next(EventSource& client) {
@@ -136,7 +139,7 @@ TEST_F(SharedWatchTest, EndsWithAMessageThatHasNoFormInJson) {
 
 TEST_F(SharedWatchTest, CallsForEachKeyAnew) {
   const auto first = Join("reader"), second = Join("writer");
-  service_.AwaitCalls(2);
+  EXPECT_TRUE(service_.AwaitCalls(2));
 }
 
 TEST_F(SharedWatchTest, GivesWhoComesLateTheLastOfEachKindInTheirOrder) {
@@ -200,7 +203,7 @@ TEST_F(SharedWatchTest, EndsForAllAndBeginsAnew) {
   EXPECT_EQ(Next(*second), Text(EstimateOf(1)));
   EXPECT_EQ(Await(*second), Event::kEnd);
   const auto third = Join("reader");
-  service_.AwaitCalls(2);
+  EXPECT_TRUE(service_.AwaitCalls(2));
 }
 
 TEST_F(SharedWatchTest, IsCancelledWhenItsLastClientGoes) {
@@ -211,7 +214,7 @@ TEST_F(SharedWatchTest, IsCancelledWhenItsLastClientGoes) {
   service_.Send(EstimateOf(2));
   while (Next(*second) != Text(EstimateOf(2))) continue;
   second.reset();
-  service_.AwaitEnds(1);
+  EXPECT_TRUE(service_.AwaitEnds(1));
 }
 
 }  // namespace
