@@ -3,7 +3,6 @@
 import json
 import socket
 import threading
-import time
 
 import numpy as np
 import pytest
@@ -291,13 +290,20 @@ def test_a_state_of_another_form_is_refused(rig, data, capfd):
 
 
 def test_a_daemon_that_never_comes_ends_with_a_failure(rig, data, capfd):
+    said = ""
+
+    def has_tried():
+        nonlocal said
+        said += capfd.readouterr().err
+        return "next attempt" in said
+
     with socket.socket() as nobody:
         nobody.bind(("127.0.0.1", 0))
         one = rig(f"127.0.0.1:{nobody.getsockname()[1]}", stream={"end_timeout_s": 0.2}).start()
         one.send(frames(data)[:100])
-        time.sleep(0.3)
+        wait_for(has_tried)
         assert one.end() == 1
-    said = capfd.readouterr().err
+    said += capfd.readouterr().err
     assert "ended by a failure" in said and said.count("next attempt") < 10
 
 
@@ -313,7 +319,8 @@ def test_a_last_estimate_that_takes_too_long_is_not_waited_for(rig, data, monkey
 
 
 def test_a_clock_that_is_set_back_begins_a_new_run(rig, client, data, monkeypatch):
-    monkeypatch.setattr("polyest.bridge._feeder.PATIENCE_S", 0.1)
+    now_s = 0.0
+    monkeypatch.setattr("polyest.io._assembler.monotonic", lambda: now_s)
     one = rig().start()
     one.send(frames(data)[:1000])
     wait_for(lambda: one.bridge.counts().rows >= 990)
@@ -322,7 +329,7 @@ def test_a_clock_that_is_set_back_begins_a_new_run(rig, client, data, monkeypatc
         message.timestamp -= 3600
     one.send(early[:10])
     wait_for(lambda: one.bridge.counts().late == 10)
-    time.sleep(0.11)
+    now_s = 5.1  # longer than the bridge has patience with a clock that is set back
     one.send(early[10:])
     wait_for(lambda: one.bridge.counts().new_runs == 1)
     assert one.end() == 0
