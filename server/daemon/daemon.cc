@@ -334,7 +334,9 @@ bool Daemon::Stop() {
   server_->GetHealthCheckService()->SetServingStatus(false);
   if (database_ != nullptr) database_->StartDraining();
   const auto drained = std::chrono::steady_clock::now() + options_.drain_timeout;
-  calls_.Drain(drained);
+  if (!calls_.Drain(drained)) {
+    spdlog::warn("calls that have not ended within --drain-timeout-s are cancelled");
+  }
   if (handover_ != nullptr) handover_->LetGo(drained);
   stop_.request_stop();
   for (WebPort* const port : {web_.get(), umbridge_.get()}) {

@@ -107,7 +107,7 @@ void OpenCalls::DrainKind(Kind kind) {
   }
 }
 
-void OpenCalls::Drain(std::chrono::steady_clock::time_point deadline) {
+bool OpenCalls::Drain(std::chrono::steady_clock::time_point deadline) {
   {
     std::lock_guard lock(mutex_);
     draining_ = true;
@@ -121,7 +121,9 @@ void OpenCalls::Drain(std::chrono::steady_clock::time_point deadline) {
   }
   DrainKind(Kind::kWatcher);
   std::unique_lock lock(mutex_);
-  left_.wait_until(lock, deadline, [this] { return open(Kind::kWatcher) == 0; });
+  return left_.wait_until(lock, deadline, [this] {
+    return open(Kind::kUnary) + open(Kind::kWriter) + open(Kind::kWatcher) == 0;
+  });
 }
 
 }  // namespace polyest::internal

@@ -58,8 +58,8 @@ class OpenCalls {
                                                 std::weak_ptr<Drainable> stream = {});
 
   // Refuses new calls from here on, asks the streams to end and waits until all calls have left, or
-  // until the deadline.
-  void Drain(std::chrono::steady_clock::time_point deadline);
+  // until the deadline. Returns whether all have left.
+  bool Drain(std::chrono::steady_clock::time_point deadline);
 
   // Returns the number of open calls of a kind.
   int Count(Kind kind) const;

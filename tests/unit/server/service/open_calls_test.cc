@@ -34,13 +34,13 @@ TEST(OpenCalls, EndsWritersBeforeWatchers) {
   });
   watching = *calls.Enter(Kind::kWatcher, "t", watcher);
   writing = *calls.Enter(Kind::kWriter, "t", writer);
-  calls.Drain(Later());
+  EXPECT_TRUE(calls.Drain(Later()));
   EXPECT_EQ(order, "writer watcher ");
 }
 
 TEST(OpenCalls, RefusesNewCallsWhenDraining) {
   OpenCalls calls;
-  calls.Drain(Later());
+  EXPECT_TRUE(calls.Drain(Later()));
   for (const Kind kind : {Kind::kUnary, Kind::kWriter, Kind::kWatcher}) {
     EXPECT_EQ(calls.Enter(kind, "t").status().code(), absl::StatusCode::kUnavailable);
   }
@@ -48,8 +48,11 @@ TEST(OpenCalls, RefusesNewCallsWhenDraining) {
 
 TEST(OpenCalls, DoesNotWaitBeyondTheDeadline) {
   OpenCalls calls;
-  const auto stays = *calls.Enter(Kind::kUnary, "t");
-  calls.Drain(std::chrono::steady_clock::now());
+  auto stays = *calls.Enter(Kind::kUnary, "t");
+  EXPECT_FALSE(calls.Drain(std::chrono::steady_clock::now()));
+  EXPECT_EQ(calls.Count(Kind::kUnary), 1);
+  stays = nullptr;
+  EXPECT_TRUE(calls.Drain(std::chrono::steady_clock::now()));
 }
 
 TEST(OpenCalls, ForgetsStreamsThatEnded) {
@@ -60,7 +63,7 @@ TEST(OpenCalls, ForgetsStreamsThatEnded) {
     auto ticket = calls.Enter(Kind::kWriter, "t", stream);
     ASSERT_TRUE(ticket.ok());
   }
-  calls.Drain(Later());
+  EXPECT_TRUE(calls.Drain(Later()));
   EXPECT_EQ(drained, 0);
 }
 
