@@ -209,7 +209,8 @@ absl::Status Explain(const ExplainArguments& arguments, std::ostream& out) {
   }
   backend.reset();  // erases its progress line
   PrintExplanation(input.estimate, open, design, out);
-  if (arguments.no_remedies || !CallsForRemedies(input.estimate)) return absl::OkStatus();
+  if (arguments.no_remedies || !CallsForRemedies(input.problem, input.estimate))
+    return absl::OkStatus();
   if (HasFixedValueConflict(input.estimate)) {
     out << '\n';
     PrintSentence(

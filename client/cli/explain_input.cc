@@ -109,7 +109,7 @@ absl::StatusOr<ExplainInput> ReadSession(const ExplainArguments& arguments, Back
   const int64_t channels = std::max(1, session.problem().measured_size());
   input.rows = static_cast<int>(
       std::min<int64_t>(session.sample_count() / channels, std::numeric_limits<int>::max()));
-  const bool all = !arguments.no_remedies && CallsForRemedies(input.estimate);
+  const bool all = !arguments.no_remedies && CallsForRemedies(input.problem, input.estimate);
   if (all || StreamsInput(session.problem())) {
     POLYEST_ASSIGN_OR_RETURN(input.measurements, RecordOf(client, session, arguments.place, all));
   }

@@ -8,16 +8,10 @@
 
 #include "client/cli/held_out_rows.h"
 #include "core/common/status.h"
+#include "proto/wire/convert/problem.h"
 
 namespace polyest::internal {
 namespace {
-
-// Whether the likelihood is PREDICTION_ERROR, also by default.
-bool UsesFilters(const v1::Problem& problem) {
-  return problem.likelihood() == v1::Problem::PREDICTION_ERROR ||
-         problem.process_noise_size() > 0 ||
-         std::ranges::any_of(problem.uncertain(), &v1::UncertainParameter::has_drift);
-}
 
 bool MakesNumbersDoubtful(v1::Diagnostic::Code code) {
   return code == v1::Diagnostic::EXPANSION_INACCURATE || code == v1::Diagnostic::NOT_CONVERGED ||

@@ -9,12 +9,13 @@
 #include <cstdlib>
 
 #include "client/cli/number_format.h"
+#include "core/estimator/posterior/residual_tests.h"
+#include "proto/wire/convert/noise.h"
+#include "proto/wire/convert/problem.h"
 
 namespace polyest::internal {
 namespace {
 
-// χ² per sample from which noise is called larger than stated, as MODEL_MISFIT does at the least.
-constexpr double kLargerThanNoise = 1.2;
 // Factors from a size to the bounds around it.
 constexpr double kDensityMargin = 30;
 constexpr double kRateMargin = 6;
@@ -49,25 +50,28 @@ double ChiSquaredPerSample(const v1::Estimate& estimate, const std::string& outp
   return 0;
 }
 
-// Returns the standard deviation of the residuals where they are larger than the noise stated by
+// Returns the standard deviation of the residuals where they are too large for the noise stated by
 // `absolute` alone, else 0.
-double LargerSize(const v1::MeasuredOutput& output, const v1::Estimate& estimate) {
+double LargerSize(const v1::MeasuredOutput& output, const v1::Estimate& estimate, bool filtered) {
   const v1::MeasuredOutput::Noise& noise = output.noise();
+  const OutlierHandling outliers = ToOutlierHandling(noise).value_or(OutlierHandling::kNone);
   const double ratio = ChiSquaredPerSample(estimate, output.output());
   const bool is_absolute = noise.absolute() > 0 && !noise.unknown() && noise.relative() == 0 &&
                            noise.relative_to_max() == 0;
-  return is_absolute && ratio >= kLargerThanNoise ? Rounded(noise.absolute() * std::sqrt(ratio), 2)
-                                                  : 0;
+  return is_absolute && ratio >= ExcessRatio(outliers, filtered)
+             ? Rounded(noise.absolute() * std::sqrt(ratio), 2)
+             : 0;
 }
 
 // Adds correlated noise of all outputs whose noise is white. It stays white where residuals are.
 void AddCorrelatedNoise(const v1::Problem& problem, const v1::Estimate& estimate,
                         std::vector<Remedy>& remedies) {
   Remedy remedy{Remedy::Kind::kCorrelatedNoise, {}, {}};
+  const bool filtered = UsesFilters(problem);
   for (const v1::MeasuredOutput& output : problem.measured()) {
     if (!IsWhite(output.noise())) continue;
     remedy.names.push_back(output.output());
-    remedy.sizes.push_back(LargerSize(output, estimate));
+    remedy.sizes.push_back(LargerSize(output, estimate, filtered));
   }
   if (!remedy.names.empty()) remedies.push_back(remedy);
 }
@@ -76,9 +80,10 @@ void AddCorrelatedNoise(const v1::Problem& problem, const v1::Estimate& estimate
 void AddLargerNoise(const v1::Problem& problem, const v1::Estimate& estimate,
                     std::vector<Remedy>& remedies) {
   Remedy remedy{Remedy::Kind::kLargerNoise, {}, {}};
+  const bool filtered = UsesFilters(problem);
   for (const v1::MeasuredOutput& output : problem.measured()) {
     const std::string name = NoiseParameter(output.output());
-    const double size = LargerSize(output, estimate);
+    const double size = LargerSize(output, estimate, filtered);
     if (size == 0 || IsUncertain(problem, name) || problem.fixed().contains(name)) continue;
     remedy.names.push_back(output.output());
     remedy.sizes.push_back(size);

@@ -10,6 +10,9 @@
 #include "client/cli/arguments.h"
 #include "client/cli/state_spread.h"
 #include "core/common/status.h"
+#include "core/estimator/posterior/residual_tests.h"
+#include "proto/wire/convert/noise.h"
+#include "proto/wire/convert/problem.h"
 #include "proto/wire/refusal/refusal.h"
 
 namespace polyest::internal {
@@ -25,6 +28,13 @@ bool IsRefusal(const absl::Status& status) {
     return !refusal || !refusal->retry_delay;
   }
   return absl::IsInvalidArgument(status) || absl::IsFailedPrecondition(status);
+}
+
+OutlierHandling OutliersOf(const v1::Problem& problem, const std::string& output) {
+  const auto& measured = problem.measured();
+  const auto found = std::ranges::find(measured, output, &v1::MeasuredOutput::output);
+  if (found == measured.end()) return OutlierHandling::kNone;
+  return ToOutlierHandling(found->noise()).value_or(OutlierHandling::kNone);
 }
 
 class Trial {
@@ -182,12 +192,13 @@ std::vector<v1::Diagnostic::Code> Contradictions(
   return codes;
 }
 
-bool CallsForRemedies(const v1::Estimate& estimate) {
-  // Residuals are reported as too small where χ² < N/1.5.
-  return !Contradictions(estimate.diagnostics()).empty() &&
-         std::ranges::any_of(estimate.channels(), [](const v1::ChannelEstimate& channel) {
-           return 1.5 * channel.chi_squared() >= static_cast<double>(channel.samples());
-         });
+bool CallsForRemedies(const v1::Problem& problem, const v1::Estimate& estimate) {
+  if (Contradictions(estimate.diagnostics()).empty()) return false;
+  const bool filtered = UsesFilters(problem);
+  return std::ranges::any_of(estimate.channels(), [&](const v1::ChannelEstimate& channel) {
+    const double ratio = TooSmallRatio(OutliersOf(problem, channel.output()), filtered);
+    return ratio * channel.chi_squared() >= static_cast<double>(channel.samples());
+  });
 }
 
 absl::StatusOr<RemedyTrial> TryRemedies(const v1::Experiment& experiment,

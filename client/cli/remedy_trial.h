@@ -41,9 +41,9 @@ struct RemedyTrial {
 std::vector<v1::Diagnostic::Code> Contradictions(
     const google::protobuf::RepeatedPtrField<v1::Diagnostic>& diagnostics);
 
-// Returns whether an estimate is contradicted in a way that remedies may explain: by one of these
-// diagnostics, unless the residuals of all outputs are far smaller than the noise.
-bool CallsForRemedies(const v1::Estimate& estimate);
+// Returns whether the estimate of a problem is contradicted in a way that remedies may explain: by
+// one of these diagnostics, unless the residuals of all outputs are too small for the noise.
+bool CallsForRemedies(const v1::Problem& problem, const v1::Estimate& estimate);
 
 // Tries the remedies, at most eight that are not refused. One with a size has the evidence of the
 // best size tried; of the best two that gain a decisive evidence, the size is then estimated, and

@@ -13,13 +13,9 @@ namespace polyest::internal {
 namespace {
 
 // For a correct model, χ² has the mean ν, the degrees of freedom, and the standard deviation
-// √(2ν). Residuals that are too small, which is the less dangerous error, are reported when χ²
-// is below ν both by many standard deviations and by a third.
+// √(2ν). Residuals that are too small are reported when χ² is below ν both by many standard
+// deviations and by TooSmallRatio.
 constexpr double kMisfitDeviations = 6;
-constexpr double kTooSmallRatio = 1.5;
-// As kTooSmallRatio, for Student's t noise of samples that filters take: Gaussian noise of the
-// stated size leaves χ² = 0.59 N to 0.69 N there.
-constexpr double kTooSmallRatioWithTails = 2.5;
 // Relative noise whose bias, if it is taken of the samples, is mentioned.
 constexpr double kLargeRelativeNoise = 0.05;
 // A record of fewer time constants than five hardly knows them: that of a random walk, which has
@@ -38,11 +34,6 @@ std::string WideningText(const Findings& findings) {
       findings.NameOf(static_cast<int>(widest)), factor);
 }
 
-double TooSmallRatio(const ResolvedProblem& problem, size_t channel) {
-  const bool tailed = problem.problem().measured[channel].noise.outliers != OutlierHandling::kNone;
-  return problem.uses_filters() && tailed ? kTooSmallRatioWithTails : kTooSmallRatio;
-}
-
 // Whether the channel's samples are rounded to steps beside which their noise is small, also where
 // noise stated of up to a step makes up for that.
 bool IsCoarse(const Findings& findings, const std::vector<ChannelFit>& fits, size_t c) {
@@ -59,10 +50,11 @@ void AddMisfit(const Findings& findings, const Estimate& estimate,
   const std::vector<ChannelFit> fits = FitsOf(findings, estimate);
   for (size_t c = 0; c < estimate.channels.size(); ++c) {
     const ChannelEstimate& channel = estimate.channels[c];
-    if (findings.problem->problem().measured[c].noise.unknown) continue;
+    const NoiseModel& noise = findings.problem->problem().measured[c].noise;
+    if (noise.unknown) continue;
     const double degrees = findings.degrees[c];
-    if (ExceedsNoise(channel, degrees, findings.problem->problem().measured[c].noise.outliers,
-                     findings.problem->uses_filters())) {
+    const bool filtered = findings.problem->uses_filters();
+    if (ExceedsNoise(channel, degrees, noise.outliers, filtered)) {
       diagnostics.push_back(
           {DiagnosticCode::kModelMisfit,
            absl::StrFormat("output %s: residuals are %.3g times the noise assumed; model, noise or "
@@ -74,8 +66,7 @@ void AddMisfit(const Findings& findings, const Estimate& estimate,
     if (IsCoarse(findings, fits, c)) continue;
     // The expansion's own error reduces χ² by as much as it reduces the samples' weights.
     const double expected = degrees - findings.expansion->Discount(static_cast<int>(c));
-    const double ratio = TooSmallRatio(*findings.problem, c);
-    if (channel.chi_squared < expected / ratio &&
+    if (channel.chi_squared < expected / TooSmallRatio(noise.outliers, filtered) &&
         channel.chi_squared < expected - kMisfitDeviations * std::sqrt(2 * degrees)) {
       diagnostics.push_back(
           {DiagnosticCode::kModelMisfit,
@@ -83,7 +74,7 @@ void AddMisfit(const Findings& findings, const Estimate& estimate,
                "output %s: residuals are only %.3g times the noise assumed, which makes "
                "the uncertainty reported too large; give the noise its own size%s",
                channel.output, ResidualToNoise(channel, degrees),
-               findings.problem->uses_filters() ? "" : " or let it be unknown")});
+               filtered ? "" : " or let it be unknown")});
     }
   }
 }

@@ -12,6 +12,8 @@ constexpr double kExcessDeviations = 6;
 constexpr double kExcessRatio = 1.2;
 constexpr double kExcessRatioWithOutliers = 1.5;
 constexpr double kExcessRatioWithTails = 2;
+constexpr double kTooSmallRatio = 1.5;
+constexpr double kTooSmallRatioWithTails = 2.5;
 constexpr double kMaxShareForStudentT = 1.0 / 3;
 constexpr double kMaxShareForHuber = 0.15;
 constexpr double kDeviationsOfOthers = 4;
@@ -25,13 +27,19 @@ constexpr double kMaxLag1Correlation = 0.99;
 
 }  // namespace
 
+double ExcessRatio(OutlierHandling outliers, bool filtered) {
+  if (outliers == OutlierHandling::kNone) return kExcessRatio;
+  return filtered ? kExcessRatioWithTails : kExcessRatioWithOutliers;
+}
+
+double TooSmallRatio(OutlierHandling outliers, bool filtered) {
+  return filtered && outliers != OutlierHandling::kNone ? kTooSmallRatioWithTails : kTooSmallRatio;
+}
+
 bool ExceedsNoise(const ChannelEstimate& channel, double degrees, OutlierHandling outliers,
                   bool filtered) {
   const auto samples = static_cast<double>(channel.samples);
-  const double ratio = outliers == OutlierHandling::kNone ? kExcessRatio
-                       : filtered                         ? kExcessRatioWithTails
-                                                          : kExcessRatioWithOutliers;
-  if (!(channel.chi_squared > ratio * degrees)) return false;
+  if (!(channel.chi_squared > ExcessRatio(outliers, filtered) * degrees)) return false;
   return channel.chi_squared > degrees + kExcessDeviations * std::sqrt(2 * samples) ||
          NormalDeviateOfChiSquared(channel.chi_squared, std::max(1.0, degrees)) > kExcessDeviations;
 }

@@ -9,12 +9,19 @@
 
 namespace polyest::internal {
 
+// Returns the least χ² per degree of freedom that is too large for the noise assumed. It is 1.2,
+// which is noise that is larger by a tenth; 1.5 if outliers are handled, because χ² has those that
+// are not taken for gross errors, whose weight is small but not 0; 2 if filters do, whose χ² grows
+// with the logarithm of an outlier (bayes/noise.h).
+double ExcessRatio(OutlierHandling outliers, bool filtered);
+// Returns the least ratio of the degrees of freedom to χ² at which residuals are too small for the
+// noise assumed, which is the less dangerous error: 1.5; 2.5 if filters handle outliers, because
+// Gaussian noise of the stated size leaves χ² = 0.59 N to 0.69 N there.
+double TooSmallRatio(OutlierHandling outliers, bool filtered);
 // Returns whether χ² is too large for the noise assumed: for a right model it has the mean ν, the
 // degrees of freedom, and a standard deviation of at most √(2N). It must exceed ν by six of them,
-// or be as improbable as six standard deviations of a normal variable, and exceed ν by a fifth,
-// which is noise that is larger by a tenth; by a half if outliers are handled, because χ² has those
-// that are not taken for gross errors, whose weight is small but not 0; to twice ν if filters do,
-// whose χ² grows with the logarithm of an outlier (bayes/noise.h).
+// or be as improbable as six standard deviations of a normal variable, and exceed ExcessRatio times
+// ν.
 bool ExceedsNoise(const ChannelEstimate& channel, double degrees, OutlierHandling outliers,
                   bool filtered);
 // Returns whether a channel's outliers may be gross errors, which say nothing of model and noise:

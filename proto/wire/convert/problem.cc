@@ -9,10 +9,12 @@
 
 #include "core/common/field_error.h"
 #include "core/common/status.h"
+#include "core/estimator/problem/process_noise.h"
 #include "core/model/equations/equation_model.h"
 #include "polyest/catalogue.h"
 #include "proto/wire/convert/annotate.h"
 #include "proto/wire/convert/list_lengths.h"
+#include "proto/wire/convert/noise.h"
 #include "proto/wire/convert/problem_columns.h"
 #include "proto/wire/convert/uncertain_parameter.h"
 #include "proto/wire/convert/wire_fields.h"
@@ -197,40 +199,11 @@ std::vector<NamedInput> ToInputs(const v1::Problem& problem, Refusals& refusals)
   return inputs;
 }
 
-absl::StatusOr<OutlierHandling> ToOutlierHandling(const v1::MeasuredOutput::Noise& noise) {
-  switch (noise.outliers()) {
-    case v1::MeasuredOutput::Noise::OUTLIERS_UNSPECIFIED:
-    case v1::MeasuredOutput::Noise::NONE:
-      return OutlierHandling::kNone;
-    case v1::MeasuredOutput::Noise::STUDENT_T:
-      return OutlierHandling::kStudentT;
-    case v1::MeasuredOutput::Noise::HUBER:
-      return OutlierHandling::kHuber;
-    default:
-      return UnknownEnumerator("noise.outliers", noise.outliers());
-  }
-}
-
-absl::StatusOr<NoiseModel> ToNoise(const v1::MeasuredOutput::Noise& given) {
-  NoiseModel noise{given.absolute(), given.relative(), given.relative_to_max(), given.unknown()};
-  noise.full_scale = given.full_scale();
-  const auto& correlation = given.correlation();
-  noise.white_share = correlation.white_share();
-  if (correlation.has_time_constant_s()) {
-    noise.correlation = NoiseCorrelation::kKnown;
-    noise.time_constant_s = correlation.time_constant_s();
-  } else if (correlation.auto_()) {
-    noise.correlation = NoiseCorrelation::kUnknown;
-  }
-  POLYEST_ASSIGN_OR_RETURN(noise.outliers, ToOutlierHandling(given));
-  return noise;
-}
-
 std::vector<MeasuredOutput> ToMeasured(const v1::Problem& problem, Refusals& refusals) {
   std::vector<MeasuredOutput> measured;
   for (int i = 0; i < problem.measured_size(); ++i) {
     const v1::MeasuredOutput& output = problem.measured(i);
-    auto noise = Within({"measured", i}, ToNoise(output.noise()));
+    auto noise = Within({"measured", i, "noise"}, ToNoise(output.noise()));
     measured.push_back(
         {output.output(), ValueOr<NoiseModel>(std::move(noise), NoiseModel(), refusals)});
   }
@@ -310,6 +283,15 @@ absl::StatusOr<std::optional<LikelihoodForm>> ToLikelihood(v1::Problem::Likeliho
   }
 }
 
+std::vector<ProcessNoise> ToProcessNoise(const v1::Problem& given) {
+  std::vector<ProcessNoise> process_noise;
+  for (const v1::ProcessNoise& noise : given.process_noise()) {
+    process_noise.push_back(
+        {noise.state(), noise.spectral_density(), noise.unknown(), noise.lower(), noise.upper()});
+  }
+  return process_noise;
+}
+
 // Converts a problem as far as possible and adds its errors to the refusals.
 Problem Convert(const v1::Problem& given, const ModelLibrary& models, Refusals& refusals) {
   Problem problem;
@@ -320,10 +302,7 @@ Problem Convert(const v1::Problem& given, const ModelLibrary& models, Refusals& 
   problem.derived = {given.derived().begin(), given.derived().end()};
   problem.inputs = ToInputs(given, refusals);
   problem.measured = ToMeasured(given, refusals);
-  for (const v1::ProcessNoise& noise : given.process_noise()) {
-    problem.process_noise.push_back(
-        {noise.state(), noise.spectral_density(), noise.unknown(), noise.lower(), noise.upper()});
-  }
+  problem.process_noise = ToProcessNoise(given);
   problem.likelihood = ValueOr(ToLikelihood(given.likelihood()), {}, refusals);
   problem.expansion = ValueOr(ToExpansion(given.expansion()), {}, refusals);
   if (given.has_regularization()) problem.regularization = given.regularization();
@@ -344,6 +323,15 @@ Problem Convert(const v1::Problem& given, const ModelLibrary& models, Refusals& 
 std::shared_ptr<const Model> FindModelOf(const v1::Problem& problem, const ModelLibrary& models) {
   Refusals refusals;
   return ToModel(problem, models, refusals);
+}
+
+bool UsesFilters(const v1::Problem& given) {
+  Refusals unused;
+  Problem problem;
+  problem.uncertain = ToUncertain(given, unused);
+  problem.process_noise = ToProcessNoise(given);
+  problem.likelihood = ValueOr(ToLikelihood(given.likelihood()), {}, unused);
+  return UsesFilters(problem);
 }
 
 absl::StatusOr<ResolvedProblem> ToProblem(const v1::Problem& given, const ModelLibrary& models) {

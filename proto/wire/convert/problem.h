@@ -25,6 +25,9 @@ absl::StatusOr<ResolvedProblem> ToProblem(const v1::Problem& problem,
 // the model is not available, returns the errors that can be found without it.
 std::vector<absl::Status> CheckProblem(const v1::Problem& problem, const ModelLibrary& models = {});
 
+// Returns whether the likelihood of a problem is that of prediction errors, also by default.
+bool UsesFilters(const v1::Problem& problem);
+
 // Returns the model of a problem; null if it is not available.
 std::shared_ptr<const Model> FindModelOf(const v1::Problem& problem, const ModelLibrary& models);
 

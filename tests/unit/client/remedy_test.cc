@@ -10,9 +10,11 @@
 namespace polyest::internal::remedy_test {
 namespace {
 
+using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 
 template <typename Message>
 Message FromText(const std::string& json) {
@@ -120,11 +122,31 @@ TEST(RemedyTest, LargerNoiseIsAParameterWithItsOwnPrior) {
 
 TEST(RemedyTest, ResidualsThatAreOnlyTooSmallCallForNone) {
   v1::Estimate estimate = WithChiSquared(30);
-  EXPECT_FALSE(CallsForRemedies(estimate));
+  EXPECT_FALSE(CallsForRemedies(Oscillator(), estimate));
   estimate.add_diagnostics()->set_code(v1::Diagnostic::MODEL_MISFIT);
-  EXPECT_FALSE(CallsForRemedies(estimate));
+  EXPECT_FALSE(CallsForRemedies(Oscillator(), estimate));
   estimate.mutable_channels(0)->set_chi_squared(200);
-  EXPECT_TRUE(CallsForRemedies(estimate));
+  EXPECT_TRUE(CallsForRemedies(Oscillator(), estimate));
+}
+
+TEST(RemedyTest, FiltersThatHandleOutliersLeaveResidualsSmallerByThemselves) {
+  v1::Estimate estimate = WithChiSquared(60);  // Gaussian noise of the stated size leaves as much
+  estimate.add_diagnostics()->set_code(v1::Diagnostic::CORRELATED_RESIDUALS);
+  v1::Problem problem = Oscillator();
+  problem.mutable_measured(0)->mutable_noise()->set_outliers(v1::MeasuredOutput::Noise::STUDENT_T);
+  EXPECT_FALSE(CallsForRemedies(problem, estimate));
+  problem.set_likelihood(v1::Problem::PREDICTION_ERROR);
+  EXPECT_TRUE(CallsForRemedies(problem, estimate));
+  estimate.mutable_channels(0)->set_chi_squared(39);
+  EXPECT_FALSE(CallsForRemedies(problem, estimate));
+}
+
+TEST(RemedyTest, NoiseWithOutliersIsLargerFromAnotherSizeOn) {
+  v1::Problem problem = Oscillator();
+  EXPECT_THAT(Texts(ListFor(problem, 140)), Contains("larger noise of x"));
+  problem.mutable_measured(0)->mutable_noise()->set_outliers(v1::MeasuredOutput::Noise::STUDENT_T);
+  EXPECT_THAT(Texts(ListFor(problem, 140)), Not(Contains("larger noise of x")));
+  EXPECT_THAT(Texts(ListFor(problem, 160)), Contains("larger noise of x"));
 }
 
 TEST(RemedyTest, AProblemThatMeasuresNothingHasNoRemedy) {
