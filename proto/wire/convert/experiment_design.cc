@@ -1,7 +1,10 @@
 #include "proto/wire/convert/experiment_design.h"
 
+#include "core/common/field_error.h"
+#include "core/common/status.h"
 #include "proto/wire/convert/estimate.h"
 #include "proto/wire/convert/expansion_used.h"
+#include "proto/wire/convert/noise.h"
 
 namespace polyest::internal {
 namespace {
@@ -20,20 +23,37 @@ void ToProto(const OutputGain& output, v1::ComputeExperimentDesignResponse::Outp
   ToProto(output.together, *proto.mutable_together());
 }
 
+// Converts the noise of an output that could be measured. A design weighs independent samples with
+// a noise of known size, whatever they will be.
+absl::StatusOr<NoiseModel> ToNoiseOfDesign(const v1::MeasuredOutput::Noise& given) {
+  POLYEST_ASSIGN_OR_RETURN(const NoiseModel noise, ToNoise(given));
+  if (noise.unknown) {
+    return InvalidField("unknown",
+                        "is not available for a design; leave the noise out for 1 % of the range "
+                        "of the predictions");
+  }
+  if (noise.correlation != NoiseCorrelation::kWhite) {
+    return InvalidField("correlation", "is not available for a design, which takes noise as white");
+  }
+  if (noise.outliers != OutlierHandling::kNone) {
+    return InvalidField("outliers", "are not available for a design, which expects none");
+  }
+  return noise;
+}
+
 }  // namespace
 
-ExperimentOptions ToExperimentOptions(const v1::ComputeExperimentDesignRequest& request) {
+absl::StatusOr<ExperimentOptions> ToExperimentOptions(
+    const v1::ComputeExperimentDesignRequest& request) {
   ExperimentOptions options;
   options.until_s = request.until_s();
   options.step_s = request.step_s() != 0 ? request.step_s() : request.until_s() / 100;
   if (request.sample_count() != 0) options.samples = request.sample_count();
-  for (const v1::MeasuredOutput& possible : request.possible()) {
-    const auto& noise = possible.noise();
-    options.possible.push_back({possible.output(),
-                                {.absolute = noise.absolute(),
-                                 .relative = noise.relative(),
-                                 .relative_to_max = noise.relative_to_max(),
-                                 .full_scale = noise.full_scale()}});
+  for (int i = 0; i < request.possible_size(); ++i) {
+    const v1::MeasuredOutput& possible = request.possible(i);
+    POLYEST_ASSIGN_OR_RETURN(const NoiseModel noise,
+                             Within({"possible", i, "noise"}, ToNoiseOfDesign(possible.noise())));
+    options.possible.push_back({possible.output(), noise});
   }
   return options;
 }

@@ -172,7 +172,8 @@ absl::StatusOr<v1::ComputeExperimentDesignResponse> ComputeExperimentDesign(
     const v1::ComputeExperimentDesignRequest& request, int threads, const Stop& stop,
     const ModelLibrary& models, const ProblemLimits& limits) {
   POLYEST_ASSIGN_OR_RETURN(const auto* experiment, ExperimentOf(request.subject()));
-  POLYEST_RETURN_IF_ERROR(WireFields(ToExperimentOptions(request).Validate()));
+  POLYEST_ASSIGN_OR_RETURN(const ExperimentOptions options, ToExperimentOptions(request));
+  POLYEST_RETURN_IF_ERROR(WireFields(options.Validate()));
   POLYEST_ASSIGN_OR_RETURN(const std::optional<Estimate> known,
                            EstimateSoFar(*experiment, threads, stop, models, limits));
   return ComputeExperimentDesign(request, experiment->problem(), known, threads, stop, models,
@@ -183,7 +184,7 @@ absl::StatusOr<v1::ComputeExperimentDesignResponse> ComputeExperimentDesign(
     const v1::ComputeExperimentDesignRequest& request, const v1::Problem& given,
     const std::optional<Estimate>& known, int threads, const Stop& stop, const ModelLibrary& models,
     const ProblemLimits& limits) {
-  ExperimentOptions options = ToExperimentOptions(request);
+  POLYEST_ASSIGN_OR_RETURN(ExperimentOptions options, ToExperimentOptions(request));
   options.threads = threads;
   POLYEST_RETURN_IF_ERROR(WireFields(options.Validate()));
   v1::ComputeExperimentDesignRequest::Candidate own;

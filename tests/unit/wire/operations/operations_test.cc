@@ -296,6 +296,27 @@ TEST(DesignExperiment, NamesTheCandidateThatIsWrong) {
   EXPECT_THAT(std::string(status.message()), testing::StartsWith("candidates[1].inputs[0]"));
 }
 
+TEST(DesignExperiment, RefusesNoiseThatItCannotUse) {
+  const auto refusal = [](const auto& change) {
+    v1::ComputeExperimentDesignRequest request = LineDesign();
+    auto& possible = *request.add_possible();
+    possible.set_output("v");
+    possible.mutable_noise()->set_absolute(1);
+    change(*possible.mutable_noise());
+    const auto status = ComputeExperimentDesign(request, 1, {}).status();
+    if (!status.ok()) EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
+    return std::string(status.message());
+  };
+  using Noise = v1::MeasuredOutput::Noise;
+  EXPECT_EQ(refusal([](Noise& noise) { noise.set_full_scale(0); }), "");
+  EXPECT_THAT(refusal([](Noise& noise) { noise.set_unknown(true); }),
+              testing::StartsWith("possible[0].noise.unknown: is not available for a design"));
+  EXPECT_THAT(refusal([](Noise& noise) { noise.mutable_correlation()->set_auto_(true); }),
+              testing::StartsWith("possible[0].noise.correlation: is not available for a design"));
+  EXPECT_THAT(refusal([](Noise& noise) { noise.set_outliers(Noise::HUBER); }),
+              testing::StartsWith("possible[0].noise.outliers: are not available for a design"));
+}
+
 TEST(DesignExperiment, StartsFromWhatHasBeenMeasured) {
   v1::ComputeExperimentDesignRequest request = LineDesign();
   request.mutable_subject()->mutable_experiment()->mutable_measurements()->add_time_s(2);
