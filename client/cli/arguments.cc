@@ -15,7 +15,7 @@
 
 #include "client/cli/command_registry.h"
 #include "client/cli/exit_status.h"
-#include "proto/wire/transport/nearest_name.h"
+#include "core/common/nearest_name.h"
 
 namespace polyest::internal {
 namespace {

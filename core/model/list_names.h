@@ -7,6 +7,9 @@
 
 namespace polyest::internal {
 
+// Returns the names in order.
+std::vector<std::string> NamesOf(const std::vector<Quantity>& quantities);
+
 // Returns the names in order, comma-separated, to list in a message the names that exist: "m, c, k,
 // x0, v0", or "none".
 std::string ListNames(const std::vector<Quantity>& quantities);

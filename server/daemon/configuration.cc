@@ -7,7 +7,7 @@
 #include <cstdlib>
 #include <memory>
 
-#include "proto/wire/transport/nearest_name.h"
+#include "core/common/nearest_name.h"
 
 namespace polyest::internal {
 namespace {

@@ -10,8 +10,8 @@
 #include <utility>
 
 #include "client/cpp/data/cells.h"
+#include "core/common/nearest_name.h"
 #include "core/common/status.h"
-#include "proto/wire/transport/nearest_name.h"
 
 namespace polyest::internal {
 namespace {

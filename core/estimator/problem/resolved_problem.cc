@@ -13,6 +13,7 @@
 
 #include "core/common/check.h"
 #include "core/common/field_error.h"
+#include "core/common/nearest_name.h"
 #include "core/common/status.h"
 #include "core/estimator/problem/output_delay.h"
 #include "core/estimator/problem/parameters_of_runs.h"
@@ -28,10 +29,20 @@ namespace {
 
 constexpr double kGreatestFixed = 1e100;  // as of the numbers of a prior
 
-absl::Status UnknownName(const FieldPath& field, std::string_view name, std::string_view kind,
-                         const ModelDescription& model, std::string_view known) {
-  return InvalidField(field, absl::StrFormat("model %s has no %s \"%s\"; it has %s", model.name,
-                                             kind, name, known.empty() ? "none" : known));
+// Refuses a name that is none of the `known` ones, which `list` shows.
+absl::Status UnknownName(const FieldPath& field, const std::string& name, const char* kind,
+                         const ModelDescription& model, const std::vector<std::string>& known,
+                         const std::string& list) {
+  const std::string nearest = NearestName(name, known);
+  const std::string hint = nearest.empty() ? absl::StrCat("it has ", list.empty() ? "none" : list)
+                                           : absl::StrCat("did you mean \"", nearest, "\"?");
+  return InvalidField(
+      field, absl::StrFormat("model %s has no %s \"%s\"; %s", model.name, kind, name, hint));
+}
+
+absl::Status UnknownName(const FieldPath& field, const std::string& name, const char* kind,
+                         const ModelDescription& model, const std::vector<Quantity>& known) {
+  return UnknownName(field, name, kind, model, NamesOf(known), ListNames(known));
 }
 
 absl::Status ValidateGerms(const ExpansionOptions& options, const Prior& prior) {
@@ -173,7 +184,7 @@ void ResolvedProblem::Resolver::ResolveInputs() {
     const FieldPath field{"inputs", i};
     const auto column = model_.FindInput(input.name);
     if (!column) {
-      Refuse(UnknownName(field, input.name, "input", model_, ListNames(model_.inputs)));
+      Refuse(UnknownName(field, input.name, "input", model_, model_.inputs));
       continue;
     }
     if (!signals_.insert(*column).second) {
@@ -197,7 +208,7 @@ void ResolvedProblem::Resolver::ResolveMeasured() {
     const FieldPath field{"measured", i};
     const auto column = model_.FindOutput(measured.output);
     if (!column) {
-      Refuse(UnknownName(field, measured.output, "output", model_, ListNames(model_.outputs)));
+      Refuse(UnknownName(field, measured.output, "output", model_, model_.outputs));
       continue;
     }
     if (Measured(*column)) Refuse(field, "output %s is given twice", measured.output);
@@ -215,7 +226,7 @@ std::optional<int> ResolvedProblem::Resolver::Find(const FieldPath& field,
                                                    const std::string& name) {
   const auto index = settable_.Find(name);
   if (!index) {
-    Refuse(UnknownName(field, name, "parameter", model_, settable_.Describe()));
+    Refuse(UnknownName(field, name, "parameter", model_, settable_.Names(), settable_.Describe()));
     return std::nullopt;
   }
   const SettableQuantities::Settable& settable = settable_[*index];

@@ -4,8 +4,8 @@
 #include <absl/strings/str_join.h>
 
 #include <algorithm>
-#include <numeric>
 
+#include "core/common/nearest_name.h"
 #include "core/model/equations/limits.h"
 
 namespace polyest::internal::equations {
@@ -40,22 +40,6 @@ constexpr Function kFunctions[] = {
 
 bool IsLetter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; }
 
-// Returns the Levenshtein distance: the number of letters to insert, delete or replace to turn one
-// word into the other.
-size_t Distance(std::string_view from, std::string_view to) {
-  std::vector<size_t> row(to.size() + 1);
-  std::iota(row.begin(), row.end(), size_t{0});
-  for (size_t i = 0; i < from.size(); ++i) {
-    size_t diagonal = std::exchange(row[0], i + 1);
-    for (size_t j = 0; j < to.size(); ++j) {
-      const size_t exchanged = diagonal + (from[i] == to[j] ? 0 : 1);
-      diagonal = row[j + 1];
-      row[j + 1] = std::min({exchanged, row[j] + 1, diagonal + 1});
-    }
-  }
-  return row[to.size()];
-}
-
 }  // namespace
 
 const Function* FindFunction(std::string_view name) {
@@ -78,15 +62,8 @@ std::string SuggestFunction(std::string_view unknown, const std::vector<std::str
   std::vector<std::string> names;
   for (const Function& function : kFunctions) names.emplace_back(function.name);
   names.insert(names.end(), tables.begin(), tables.end());
-  std::string nearest;
-  size_t least = std::min(size_t{2}, unknown.size() / 2) + 1;
-  for (const std::string& name : names) {
-    const size_t distance = Distance(unknown, name);
-    if (distance >= least) continue;
-    least = distance;
-    nearest = name;
-  }
-  if (!nearest.empty()) return absl::StrCat("; do you mean ", nearest, "?");
+  const std::string nearest = NearestName(std::string(unknown), names);
+  if (!nearest.empty()) return absl::StrCat("; did you mean \"", nearest, "\"?");
   return absl::StrCat("; the functions are ", absl::StrJoin(names, ", "));
 }
 

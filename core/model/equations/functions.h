@@ -28,7 +28,7 @@ bool IsReserved(std::string_view name);
 // kMaxNameLength characters.
 bool IsName(std::string_view text);
 
-// Returns "; do you mean sin?" if a function's or a table's name is similar to `unknown`, otherwise
+// Returns `; did you mean "sin"?` if the name of a function or a table is near `unknown`, otherwise
 // "; the functions are abs, …".
 std::string SuggestFunction(std::string_view unknown, const std::vector<std::string>& tables);
 

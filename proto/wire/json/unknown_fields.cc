@@ -7,7 +7,7 @@
 
 #include <map>
 
-#include "proto/wire/transport/nearest_name.h"
+#include "core/common/nearest_name.h"
 
 namespace polyest::internal {
 namespace {

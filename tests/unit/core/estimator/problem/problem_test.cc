@@ -86,6 +86,18 @@ TEST(ResolvedProblem, AnswersAnUnknownNameWithTheNamesThereAre) {
             "measured[1]: model mass_spring_damper has no output \"y\"; it has x, v, a");
 }
 
+TEST(ResolvedProblem, SuggestsTheNameThatIsProbablyMeant) {
+  EXPECT_EQ(Refusal([](Problem& p) { p.fixed["force.amplitud"] = 1; }),
+            "fixed.force.amplitud: model mass_spring_damper has no parameter \"force.amplitud\"; "
+            "did you mean \"force.amplitude\"?");
+  EXPECT_EQ(Refusal([](Problem& p) { p.uncertain[0].name = "K"; }),
+            "uncertain[0]: model mass_spring_damper has no parameter \"K\"; did you mean \"k\"?");
+  EXPECT_EQ(Refusal([](Problem& p) { p.inputs[0].name = "froce"; }),
+            "inputs[0]: model mass_spring_damper has no input \"froce\"; did you mean \"force\"?");
+  EXPECT_EQ(Refusal([](Problem& p) { p.measured[1].output = "X"; }),
+            "measured[1]: model mass_spring_damper has no output \"X\"; did you mean \"x\"?");
+}
+
 TEST(ResolvedProblem, RefusesANameGivenTwice) {
   EXPECT_EQ(Refusal([](Problem& p) { p.uncertain[1].name = "k"; }),
             "uncertain[1]: k is given twice");

@@ -57,8 +57,8 @@ const Wrong kWrong[] = {
     {"αβ*x", "column 1: unexpected character (at \"αβ*x\")"},
     {"a + 'b'", "column 5: unexpected character (at \"'b'\")"},
     {"a < b < c", "column 7: comparisons do not chain: a < b < c is a < b && b < c (at \"< c\")"},
-    {"k*sine(a)", "column 3: unknown function \"sine\"; do you mean sin? (at \"sine(a)\")"},
-    {"Sqrt(a)", "column 1: unknown function \"Sqrt\"; do you mean sqrt? (at \"Sqrt(a)\")"},
+    {"k*sine(a)", "column 3: unknown function \"sine\"; did you mean \"sin\"? (at \"sine(a)\")"},
+    {"Sqrt(a)", "column 1: unknown function \"Sqrt\"; did you mean \"sqrt\"? (at \"Sqrt(a)\")"},
     {"wobble(a)",
      "column 1: unknown function \"wobble\"; the functions are abs, acos, asin, atan, atan2, ceil, "
      "cos, cosh, exp, floor, hypot, if, log, log10, max, min, mod, pow, sign, sin, sinh, sqrt, "

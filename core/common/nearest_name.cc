@@ -1,9 +1,10 @@
-#include "proto/wire/transport/nearest_name.h"
+#include "core/common/nearest_name.h"
 
 #include <absl/strings/ascii.h>
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>
+#include <absl/strings/string_view.h>
 
 #include <algorithm>
 
@@ -38,7 +39,7 @@ size_t Distance(absl::string_view a, absl::string_view b) {
 
 }  // namespace
 
-std::string NearestName(absl::string_view word, const std::vector<std::string>& known) {
+std::string NearestName(const std::string& word, const std::vector<std::string>& known) {
   const std::string wrong = absl::AsciiStrToLower(word.substr(0, kMaxWordLength));
   const std::string* nearest = nullptr;
   size_t least = 0;
@@ -57,7 +58,7 @@ std::string NearestName(absl::string_view word, const std::vector<std::string>& 
   return "";
 }
 
-std::string SuggestName(absl::string_view word, const std::vector<std::string>& known) {
+std::string SuggestName(const std::string& word, const std::vector<std::string>& known) {
   if (known.empty()) return "";
   const std::string nearest = NearestName(word, known);
   if (!nearest.empty()) return absl::StrCat("did you mean \"", nearest, "\"?");

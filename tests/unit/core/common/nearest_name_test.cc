@@ -1,4 +1,4 @@
-#include "proto/wire/transport/nearest_name.h"
+#include "core/common/nearest_name.h"
 
 #include <gtest/gtest.h>
 

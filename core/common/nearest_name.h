@@ -2,8 +2,6 @@
 
 // Suggests a known name in messages about a name that does not exist.
 
-#include <absl/strings/string_view.h>
-
 #include <string>
 #include <vector>
 
@@ -13,10 +11,10 @@ namespace polyest::internal {
 // most a third of its letters (inserted, left out, changed or swapped with the next), or of which
 // `word` is the beginning. Returns an empty string when no name is that near. The first of equally
 // near names wins.
-std::string NearestName(absl::string_view word, const std::vector<std::string>& known);
+std::string NearestName(const std::string& word, const std::vector<std::string>& known);
 
 // Returns a hint for a message about the unknown name `word`: `did you mean "uniform"?`, or, when
 // no name is near, `known names: lower, upper`. Returns an empty string when `known` is empty.
-std::string SuggestName(absl::string_view word, const std::vector<std::string>& known);
+std::string SuggestName(const std::string& word, const std::vector<std::string>& known);
 
 }  // namespace polyest::internal
