@@ -9,6 +9,7 @@
 
 #include "client/cli/screen.h"
 #include "core/common/status.h"
+#include "core/common/utf8.h"
 #include "core/estimator/record/memory_store.h"
 
 namespace polyest::internal {
@@ -30,7 +31,7 @@ std::string Cut(const std::string& text, int places) {
   for (size_t i = 0; i < text.size(); end = i) {
     do {
       ++i;
-    } while (i < text.size() && (static_cast<unsigned char>(text[i]) & 0xC0) == 0x80);
+    } while (i < text.size() && ContinuesCharacter(text[i]));
     if (DisplayWidth(absl::string_view(text).substr(0, i)) > places) break;
   }
   return text.substr(0, end);

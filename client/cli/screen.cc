@@ -9,6 +9,8 @@
 #include <algorithm>
 #include <cstdlib>
 
+#include "core/common/utf8.h"
+
 namespace polyest::internal {
 namespace {
 
@@ -114,7 +116,7 @@ int DisplayWidth(absl::string_view text) {
     const auto byte = static_cast<unsigned char>(text[i]);
     const bool combines = byte == 0xCC || (byte == 0xCD && i + 1 < text.size() &&
                                            static_cast<unsigned char>(text[i + 1]) < 0xB0);
-    if ((byte & 0xC0) != 0x80 && !combines) ++width;
+    if (!ContinuesCharacter(text[i]) && !combines) ++width;
     ++i;
   }
   return width;

@@ -11,6 +11,7 @@
 
 #include "core/common/check.h"
 #include "core/common/field_error.h"
+#include "core/common/utf8.h"
 #include "polyest/rpc/error_details.pb.h"
 #include "proto/wire/convert/wire_fields.h"
 #include "proto/wire/refusal/refusal.h"
@@ -67,9 +68,7 @@ constexpr size_t kLongestDescription = 200;
 
 std::string Shortened(absl::string_view text, size_t longest) {
   if (text.size() <= longest) return std::string(text);
-  // The cut must not fall within a character of UTF-8.
-  while ((text[longest] & 0xC0) == 0x80) --longest;
-  return absl::StrCat(text.substr(0, longest), "…");
+  return absl::StrCat(CutAt(text, longest), "…");
 }
 
 template <typename Detail>

@@ -12,6 +12,8 @@
 #include <algorithm>
 #include <memory>
 
+#include "core/common/utf8.h"
+
 namespace polyest::internal {
 namespace {
 
@@ -57,31 +59,7 @@ bool IsPlainWord(const std::string& text) {
 // Returns the beginning of a text, because what a client wrote may be long.
 std::string Shortened(const std::string& text) {
   constexpr size_t kLongest = 200;
-  return text.size() <= kLongest ? text : text.substr(0, kLongest) + "...";
-}
-
-// Replaces by '?' the bytes that do not continue a character of UTF-8, or begin none.
-std::string ValidUtf8(std::string text) {
-  size_t i = 0;
-  while (i < text.size()) {
-    const auto lead = static_cast<unsigned char>(text[i]);
-    const size_t length = lead < 0x80                    ? 1
-                          : lead >= 0xC2 && lead <= 0xDF ? 2
-                          : lead >= 0xE0 && lead <= 0xEF ? 3
-                          : lead >= 0xF0 && lead <= 0xF4 ? 4
-                                                         : 0;
-    size_t good = length > 0 ? 1 : 0;
-    while (good < length && i + good < text.size() &&
-           (static_cast<unsigned char>(text[i + good]) & 0xC0) == 0x80) {
-      ++good;
-    }
-    if (length > 0 && good == length) {
-      i += length;
-    } else {
-      text[i++] = '?';
-    }
-  }
-  return text;
+  return text.size() <= kLongest ? text : absl::StrCat(CutAt(text, kLongest), "...");
 }
 
 }  // namespace

@@ -15,8 +15,8 @@
 #include <streambuf>
 #include <string>
 
-#include "client/cpp/data/text_encoding.h"
 #include "core/common/check.h"
+#include "core/common/utf8.h"
 #include "polyest/data_file.h"
 
 namespace {

@@ -9,6 +9,7 @@
 #include <algorithm>
 
 #include "client/cpp/data/text_encoding.h"
+#include "core/common/utf8.h"
 
 namespace polyest::internal {
 namespace {
@@ -45,8 +46,7 @@ absl::string_view StripCell(absl::string_view text) {
 std::string QuoteCell(absl::string_view cell) {
   constexpr size_t kMaxShown = 40;
   std::string shown = ToUtf8(cell);
-  size_t length = std::min(shown.size(), kMaxShown);
-  while (length > 0 && length < shown.size() && (shown[length] & 0xC0) == 0x80) --length;
+  const size_t length = CutAt(shown, kMaxShown).size();
   const bool cut = length < shown.size();
   shown.resize(length);
   if (std::any_of(shown.begin(), shown.end(), IsControl)) shown = absl::Utf8SafeCHexEscape(shown);

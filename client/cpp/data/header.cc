@@ -10,9 +10,9 @@
 #include "client/cpp/data/cells.h"
 #include "client/cpp/data/clock_time.h"
 #include "client/cpp/data/number_cell.h"
-#include "client/cpp/data/text_encoding.h"
 #include "client/cpp/file_kind.h"
 #include "core/common/status.h"
+#include "core/common/utf8.h"
 
 namespace polyest::internal {
 namespace {

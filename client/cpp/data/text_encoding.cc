@@ -2,7 +2,7 @@
 
 #include <absl/strings/match.h>
 
-#include <algorithm>
+#include "core/common/utf8.h"
 
 namespace polyest::internal {
 namespace {
@@ -36,23 +36,6 @@ void AppendCharacter(unsigned character, std::string& utf8) {
     add(0x80 | (character >> 6 & 0x3F));
     add(0x80 | (character & 0x3F));
   }
-}
-
-// Returns the length of the UTF-8 character at the beginning; 0 if there is none: it is cut off,
-// longer than needed, a surrogate, or beyond U+10FFFF.
-size_t Utf8Length(absl::string_view bytes) {
-  const unsigned first = ByteAt(bytes, 0);
-  if (first < 0x80) return 1;
-  const size_t length = first < 0xC2 ? 0 : first < 0xE0 ? 2 : first < 0xF0 ? 3 : 4;
-  if (length == 0 || first > 0xF4 || length > bytes.size()) return 0;
-  for (size_t i = 1; i < length; ++i) {
-    if ((ByteAt(bytes, i) & 0xC0) != 0x80) return 0;
-  }
-  const unsigned first_two = first << 8 | ByteAt(bytes, 1);
-  const bool too_long = (length == 3 && first_two < 0xE0A0) || (length == 4 && first_two < 0xF090);
-  const bool surrogate = length == 3 && first_two >= 0xEDA0 && first_two <= 0xEDBF;
-  const bool beyond = length == 4 && first_two > 0xF48F;
-  return too_long || surrogate || beyond ? 0 : length;
 }
 
 }  // namespace
@@ -90,15 +73,6 @@ void Utf16Decoder::AppendUnit(unsigned unit, std::string& utf8) {
   } else {
     AppendCharacter(is_low ? kReplacement : unit, utf8);
   }
-}
-
-bool IsUtf8(absl::string_view bytes) {
-  while (!bytes.empty()) {
-    const size_t length = Utf8Length(bytes);
-    if (length == 0) return false;
-    bytes.remove_prefix(length);
-  }
-  return true;
 }
 
 std::string ToUtf8(absl::string_view bytes) {

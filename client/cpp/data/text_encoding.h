@@ -45,9 +45,6 @@ class Utf16Decoder {
   unsigned high_ = 0;  // the first half of a pair whose second is to come
 };
 
-// Returns whether bytes are UTF-8. Tells nothing about their meaning: ASCII is UTF-8.
-bool IsUtf8(absl::string_view bytes);
-
 // Returns the bytes if they are UTF-8; otherwise takes them for Windows-1252, which is Latin-1
 // with typographic characters.
 std::string ToUtf8(absl::string_view bytes);

@@ -51,6 +51,9 @@ TEST(StructuredLogTest, LeavesOutFieldsWithoutAValue) {
 
 TEST(StructuredLogTest, ShortensWhatIsLong) {
   EXPECT_EQ(FieldsAsText({{"a", std::string(1000, 'x')}}), " a=" + std::string(200, 'x') + "...");
+  const std::string cars = "1234" + std::string("🚗") + std::string(300, 'x');
+  EXPECT_EQ(FieldsAsJson({{"a", std::string(194, 'x') + cars}}),
+            ",\"a\":\"" + std::string(194, 'x') + "1234...\"");
 }
 
 TEST(StructuredLogTest, WritesJsonThatReadsBackWhateverTheText) {
