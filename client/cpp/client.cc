@@ -126,6 +126,23 @@ absl::StatusOr<Response> Client::Call(Stub* stub, Method<Stub, Response, Request
   return response;
 }
 
+template <typename Stub, typename Request, typename Response, typename Take>
+absl::Status Client::ReadAll(Stub* stub, StreamingMethod<Stub, Request, Response> method,
+                             const Request& request, grpc::ClientContext& call, const Take& take) {
+  POLYEST_RETURN_IF_ERROR(connection_.status());
+  Prepare(call);
+  const auto reader = (stub->*method)(&call, request);
+  Response response;
+  while (reader->Read(&response)) {
+    const absl::Status taken = take(response);
+    if (taken.ok()) continue;
+    call.TryCancel();
+    reader->Finish();
+    return taken;
+  }
+  return StatusOf(reader->Finish());
+}
+
 absl::StatusOr<v1::ListModelsResponse> Client::ListModels(const v1::ListModelsRequest& request) {
   return Call(models_.get(), &v1::ModelService::Stub::ListModels, request);
 }
@@ -259,55 +276,29 @@ absl::StatusOr<v1::DrainNodeResponse> Client::DrainNode(const v1::DrainNodeReque
 absl::Status Client::WatchSession(const v1::WatchSessionRequest& request,
                                   const std::function<bool(const v1::WatchSessionResponse&)>& take,
                                   grpc::ClientContext* call) {
-  POLYEST_RETURN_IF_ERROR(connection_.status());
   grpc::ClientContext own;
-  grpc::ClientContext& context = call != nullptr ? *call : own;
-  Prepare(context);
-  const auto reader = sessions_->WatchSession(&context, request);
-  v1::WatchSessionResponse response;
-  while (reader->Read(&response)) {
-    if (take(response)) continue;
-    context.TryCancel();
-    reader->Finish();
-    return absl::OkStatus();
-  }
-  return StatusOf(reader->Finish());
+  bool left = false;
+  const absl::Status status =
+      ReadAll(sessions_.get(), &v1::SessionService::Stub::WatchSession, request,
+              call != nullptr ? *call : own, [&](const v1::WatchSessionResponse& response) {
+                left = !take(response);
+                return left ? absl::CancelledError() : absl::OkStatus();
+              });
+  return left ? absl::OkStatus() : status;
 }
 
 absl::Status Client::ExportSession(
     const v1::ExportSessionRequest& request,
     const std::function<absl::Status(const v1::SessionRecord&)>& take) {
-  POLYEST_RETURN_IF_ERROR(connection_.status());
   grpc::ClientContext context;
-  Prepare(context);
-  const auto reader = sessions_->ExportSession(&context, request);
-  v1::SessionRecord record;
-  while (reader->Read(&record)) {
-    const absl::Status taken = take(record);
-    if (taken.ok()) continue;
-    context.TryCancel();
-    reader->Finish();
-    return taken;
-  }
-  return StatusOf(reader->Finish());
+  return ReadAll(sessions_.get(), &v1::SessionService::Stub::ExportSession, request, context, take);
 }
 
 absl::Status Client::DownloadBackup(
     const v1::DownloadBackupRequest& request,
     const std::function<absl::Status(const v1::DownloadBackupResponse&)>& take) {
-  POLYEST_RETURN_IF_ERROR(connection_.status());
   grpc::ClientContext context;
-  Prepare(context);
-  const auto reader = backups_->DownloadBackup(&context, request);
-  v1::DownloadBackupResponse part;
-  while (reader->Read(&part)) {
-    const absl::Status taken = take(part);
-    if (taken.ok()) continue;
-    context.TryCancel();
-    reader->Finish();
-    return taken;
-  }
-  return StatusOf(reader->Finish());
+  return ReadAll(backups_.get(), &v1::BackupService::Stub::DownloadBackup, request, context, take);
 }
 
 absl::StatusOr<v1::Session> Client::ImportSession(

@@ -143,6 +143,9 @@ class Client {
  private:
   template <typename Stub, typename Response, typename Request>
   using Method = grpc::Status (Stub::*)(grpc::ClientContext*, const Request&, Response*);
+  template <typename Stub, typename Request, typename Response>
+  using StreamingMethod =
+      std::unique_ptr<grpc::ClientReader<Response>> (Stub::*)(grpc::ClientContext*, const Request&);
   // Adds the token and the limits of the options to a call.
   void Prepare(grpc::ClientContext& call) const;
   // Returns the status of a call, with a hint if no connection could be made.
@@ -150,6 +153,11 @@ class Client {
   template <typename Stub, typename Response, typename Request>
   absl::StatusOr<Response> Call(Stub* stub, Method<Stub, Response, Request> method,
                                 const Request& request);
+  // Makes a call and gives each message that it is answered with to `take`. Once `take` returns an
+  // error, cancels the call and returns that error.
+  template <typename Stub, typename Request, typename Response, typename Take>
+  absl::Status ReadAll(Stub* stub, StreamingMethod<Stub, Request, Response> method,
+                       const Request& request, grpc::ClientContext& call, const Take& take);
 
   std::string server_;
   ClientOptions options_;
