@@ -13,9 +13,9 @@
 #include "client/cli/commands.h"
 #include "client/cli/draft_file.h"
 #include "client/cli/exit_status.h"
-#include "client/cli/number_format.h"
 #include "core/common/check.h"
 #include "core/common/status.h"
+#include "proto/wire/check/numbers.h"
 
 namespace polyest::internal {
 namespace {

@@ -8,6 +8,7 @@
 #include "client/cli/number_format.h"
 #include "client/cli/screen.h"
 #include "client/cli/text_table.h"
+#include "proto/wire/check/numbers.h"
 
 namespace polyest::internal {
 namespace {

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <cstdlib>
 
 namespace polyest::internal {
 namespace {
@@ -72,14 +73,14 @@ std::string FormatNumber(double value, int digits) {
   return absl::StrFormat("%.*g", digits, value);
 }
 
+double Rounded(double value, int digits) {
+  return std::strtod(FormatNumber(value, digits).c_str(), nullptr);
+}
+
 std::string FormatExact(double value) {
   char text[32];
   const auto result = std::to_chars(text, text + sizeof(text), value);
   return std::string(text, result.ptr);
-}
-
-std::string Counted(int64_t count, const std::string& what) {
-  return absl::StrCat(count, " ", what, count == 1 ? "" : "s");
 }
 
 std::string UnitText(const std::string& unit) { return unit == "1" ? "" : unit; }

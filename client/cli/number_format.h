@@ -2,7 +2,6 @@
 
 // Formats numbers and their units for readers.
 
-#include <cstdint>
 #include <string>
 
 namespace polyest::internal {
@@ -18,10 +17,10 @@ std::string FormatUncertain(double value, double standard_deviation);
 std::string FormatInterval(double lower, double upper, double standard_deviation);
 // Returns a value with at most `digits` significant digits.
 std::string FormatNumber(double value, int digits = 4);
+// Returns the number nearest to a value that has at most `digits` significant digits.
+double Rounded(double value, int digits);
 // Returns a probability as "97.5 %".
 std::string FormatPercent(double probability);
-// Returns "1 session" or "2 sessions" for "session".
-std::string Counted(int64_t count, const std::string& what);
 // Returns a unit as it is printed: nothing for the plain number's "1".
 std::string UnitText(const std::string& unit);
 // Returns "x (m)", or the name alone for a plain number.

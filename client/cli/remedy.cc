@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 
 #include "client/cli/number_format.h"
 #include "core/estimator/posterior/residual_tests.h"
@@ -20,12 +19,11 @@ namespace {
 constexpr double kDensityMargin = 30;
 constexpr double kRateMargin = 6;
 
-double Rounded(double size, int digits = 1) {
-  return std::strtod(FormatNumber(size, digits).c_str(), nullptr);
-}
+// Digits of a size that nobody knows yet.
+constexpr int kSizeDigits = 1;
 
-std::vector<double> Rounded(std::vector<double> sizes) {
-  std::ranges::transform(sizes, sizes.begin(), [](double size) { return Rounded(size); });
+std::vector<double> RoundedSizes(std::vector<double> sizes) {
+  for (double& size : sizes) size = Rounded(size, kSizeDigits);
   return sizes;
 }
 
@@ -100,7 +98,7 @@ void AddProcessNoise(const v1::Problem& problem, const std::vector<StateSpread>&
     const double density = state.spread * state.spread / duration_s;
     remedies.push_back({Remedy::Kind::kProcessNoise,
                         {state.state},
-                        Rounded({1e-2 * density, density, 1e-4 * density})});
+                        RoundedSizes({1e-2 * density, density, 1e-4 * density})});
   }
 }
 
@@ -112,7 +110,7 @@ void AddDrifts(const v1::Problem& problem, const v1::Estimate& estimate, double 
       if (p.name() != parameter.name() || !(p.prior_std_dev() > 0)) continue;
       const double rate = p.prior_std_dev() / std::sqrt(duration_s);
       remedies.push_back(
-          {Remedy::Kind::kDrift, {p.name()}, Rounded({1e-1 * rate, rate, 1e-2 * rate})});
+          {Remedy::Kind::kDrift, {p.name()}, RoundedSizes({1e-1 * rate, rate, 1e-2 * rate})});
     }
   }
 }
@@ -208,8 +206,8 @@ v1::Problem WithUnknownSize(v1::Problem problem, const Remedy& remedy, double si
   problem = WithKnownSize(std::move(problem), remedy, size);
   const auto bound = [size](auto& unknown, double margin) {
     unknown.set_unknown(true);
-    unknown.set_lower(Rounded(size / margin));
-    unknown.set_upper(Rounded(size * margin));
+    unknown.set_lower(Rounded(size / margin, kSizeDigits));
+    unknown.set_upper(Rounded(size * margin, kSizeDigits));
   };
   if (remedy.kind == Remedy::Kind::kProcessNoise) {
     v1::ProcessNoise& noise = *problem.mutable_process_noise()->rbegin();

@@ -8,7 +8,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <map>
 #include <set>
 #include <vector>
@@ -57,17 +56,15 @@ std::vector<Quantity> ChooseUnknowns(const ModelDescription& model) {
   return unknowns;
 }
 
-// Returns a value rounded to four digits, in its shortest notation.
-std::string Rounded(double value) {
-  return FormatExact(std::strtod(FormatNumber(value).c_str(), nullptr));
-}
+// Returns a bound of a prior.
+std::string Bound(double value) { return FormatExact(Rounded(value, 4)); }
 
 std::string Uncertain(const Quantity& parameter) {
   const double half_width =
       parameter.default_value == 0 ? 1 : kPriorHalfWidth * std::abs(parameter.default_value);
   return absl::StrCat("{\"name\": ", Quoted(parameter.name),
-                      ", \"uniform\": {\"lower\": ", Rounded(parameter.default_value - half_width),
-                      ", \"upper\": ", Rounded(parameter.default_value + half_width), "}}");
+                      ", \"uniform\": {\"lower\": ", Bound(parameter.default_value - half_width),
+                      ", \"upper\": ", Bound(parameter.default_value + half_width), "}}");
 }
 
 // Returns the parameters that are fixed at their defaults. In a model without inputs, the first

@@ -13,10 +13,6 @@
 namespace polyest::internal {
 namespace {
 
-std::string Counted(int64_t count, const char* what) {
-  return absl::StrCat(count, " ", what, count == 1 ? "" : "s");
-}
-
 struct Steps {
   double usual_s = 0;  // the median; 0: there is none
   double shortest_s = 0;
