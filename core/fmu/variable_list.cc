@@ -185,6 +185,31 @@ absl::Status VariableList::FindStates3(const pugi::xml_node& structure) {
   return absl::OkStatus();
 }
 
+void VariableList::AddReal(const Variable& variable,
+                           const absl::flat_hash_map<uint32_t, int>& state_of,
+                           FmuDescription& description) {
+  ModelDescription& model = description.model;
+  const bool is_input = variable.causality == "input";
+  // A start value of another variable is a parameter too if initial="exact": it is then set, not
+  // computed.
+  const bool is_initial_value = variable.initial == "exact" && variable.has_start &&
+                                variable.variability != "constant" && !is_input;
+  if ((variable.causality == "parameter" && variable.has_start) || is_initial_value) {
+    model.parameters.push_back(variable.quantity);
+    description.parameters.push_back(variable.variable);
+  }
+  if (is_input) {
+    model.inputs.push_back(variable.quantity);
+    description.inputs.push_back(variable.variable);
+  }
+  if (variable.causality == "output" || variable.is_state) {
+    model.outputs.push_back(variable.quantity);
+    description.outputs.push_back(variable.variable);
+    const auto state = state_of.find(variable.variable.reference);
+    if (state != state_of.end()) description.outputs.back().state = state->second;
+  }
+}
+
 absl::StatusOr<std::vector<std::string>> VariableList::Sort(FmuKind kind,
                                                             FmuDescription& description) const {
   std::vector<std::string> kept;
@@ -193,7 +218,6 @@ absl::StatusOr<std::vector<std::string>> VariableList::Sort(FmuKind kind,
   for (size_t i = 0; i < states_.size(); ++i) {
     state_of.emplace(variables_[states_[i]].variable.reference, static_cast<int>(i));
   }
-  ModelDescription& model = description.model;
   for (const Variable& variable : variables_) {
     const Quantity& quantity = variable.quantity;
     if (!names.insert(quantity.name).second) {
@@ -207,27 +231,13 @@ absl::StatusOr<std::vector<std::string>> VariableList::Sort(FmuKind kind,
       kept.push_back(quantity.name);
       continue;
     }
-    if (!variable.is_real || variable.causality == "independent") continue;
-    // A start value of another variable is a parameter too if initial="exact": it is then set, not
-    // computed.
-    const bool is_initial_value = variable.initial == "exact" && variable.has_start &&
-                                  variable.variability != "constant" && !is_input;
-    if ((is_parameter && variable.has_start) || is_initial_value) {
-      model.parameters.push_back(quantity);
-      description.parameters.push_back(variable.variable);
-    }
-    if (is_input) {
-      model.inputs.push_back(quantity);
-      description.inputs.push_back(variable.variable);
-    }
-    if (variable.causality == "output" || variable.is_state) {
-      model.outputs.push_back(quantity);
-      description.outputs.push_back(variable.variable);
-      const auto state = state_of.find(variable.variable.reference);
-      if (state != state_of.end()) description.outputs.back().state = state->second;
+    if (variable.is_real && variable.causality != "independent") {
+      AddReal(variable, state_of, description);
     }
   }
-  for (const size_t state : states_) model.states.push_back(variables_[state].quantity);
+  for (const size_t state : states_) {
+    description.model.states.push_back(variables_[state].quantity);
+  }
   description.interface.states = static_cast<int>(states_.size());
   description.interface.derivatives_use_time = derivatives_use_time_;
   description.interface.event_indicators = event_indicators_;

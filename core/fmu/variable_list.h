@@ -53,6 +53,11 @@ class VariableList {
   // of the model structure.
   void NoteTime(const pugi::xml_node& unknown, int version);
 
+  // Adds a real variable to the quantities that it is one of. `state_of`: states by value
+  // reference.
+  static void AddReal(const Variable& variable, const absl::flat_hash_map<uint32_t, int>& state_of,
+                      FmuDescription& description);
+
   std::vector<Variable> variables_;
   std::vector<size_t> states_;  // in the order of the FMU's state vector
   bool derivatives_use_time_ = false;

@@ -153,6 +153,20 @@ absl::Status ReadInputSizes(const Json& file, UmBridgeDescription& read) {
   return left == 0 ? absl::OkStatus() : Wrong("inputSizes", *found, rule);
 }
 
+absl::Status ReadConfig(const Json& file, UmBridgeDescription& read) {
+  const auto config = file.find("config");
+  if (config == file.end()) return absl::OkStatus();
+  if (!config->is_object()) return Wrong("config", *config, "must be an object");
+  if (config->contains("times") && read.time_s.empty()) {
+    return Wrong("config", *config, "must not have \"times\", which polyest adds, without timesS");
+  }
+  if (config->contains("inputs") && !read.model.inputs.empty()) {
+    return Wrong("config", *config, "must not have \"inputs\", which polyest adds");
+  }
+  read.config = config->dump(-1, ' ', false, Json::error_handler_t::replace);
+  return absl::OkStatus();
+}
+
 }  // namespace
 
 absl::StatusOr<UmBridgeDescription> ParseUmBridgeDescription(const std::string& name,
@@ -182,17 +196,7 @@ absl::StatusOr<UmBridgeDescription> ParseUmBridgeDescription(const std::string& 
     return Wrong("inputs", file["inputs"],
                  "cannot drive a model with timesS, which is asked once for its whole record");
   }
-  if (const auto config = file.find("config"); config != file.end()) {
-    if (!config->is_object()) return Wrong("config", *config, "must be an object");
-    if (config->contains("times") && read.time_s.empty()) {
-      return Wrong("config", *config,
-                   "must not have \"times\", which polyest adds, without timesS");
-    }
-    if (config->contains("inputs") && !read.model.inputs.empty()) {
-      return Wrong("config", *config, "must not have \"inputs\", which polyest adds");
-    }
-    read.config = config->dump(-1, ' ', false, Json::error_handler_t::replace);
-  }
+  POLYEST_RETURN_IF_ERROR(ReadConfig(file, read));
   read.model.equations =
       absl::StrFormat("computed by the model %s of UM-Bridge servers", read.remote_name);
   read.model.source = absl::StrJoin(read.servers.urls, ", ");

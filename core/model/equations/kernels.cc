@@ -1,5 +1,8 @@
 #include "core/model/equations/kernels.h"
 
+#include <array>
+#include <utility>
+
 #include "core/common/check.h"
 #include "core/model/equations/lane_functions.h"
 
@@ -86,6 +89,18 @@ void Look(const Instruction& instruction, double* const* slots, Eigen::Index row
   }
 }
 
+// The operations that have a LaneFunction, and their kernels.
+constexpr auto kFirstSingle = static_cast<size_t>(Operation::kNegate);
+constexpr auto kLastSingle = static_cast<size_t>(Operation::kSubtractMultiplied);
+
+template <size_t... kOffsets>
+constexpr auto MakeSingleKernels(std::index_sequence<kOffsets...>) {
+  return std::array<Kernel, sizeof...(kOffsets)>{
+      Single<static_cast<Operation>(kFirstSingle + kOffsets)>...};
+}
+constexpr auto kSingleKernels =
+    MakeSingleKernels(std::make_index_sequence<kLastSingle - kFirstSingle + 1>());
+
 // Returns the kernel for the position if it is one of those given.
 template <Operation kInner, Operation operation, int... kPositions>
 Kernel PairAt(int position) {
@@ -113,61 +128,19 @@ Kernel SelectPairOf(Operation operation, int position) {
 
 Kernel SelectKernel(Operation operation) {
   switch (operation) {
-#define POLYEST_SINGLE(name) \
-  case Operation::name:      \
-    return Single<Operation::name>;
-    POLYEST_SINGLE(kNegate)
-    POLYEST_SINGLE(kNot)
-    POLYEST_SINGLE(kAbsolute)
-    POLYEST_SINGLE(kSign)
-    POLYEST_SINGLE(kSquareRoot)
-    POLYEST_SINGLE(kExponential)
-    POLYEST_SINGLE(kLogarithm)
-    POLYEST_SINGLE(kLogarithm10)
-    POLYEST_SINGLE(kSine)
-    POLYEST_SINGLE(kCosine)
-    POLYEST_SINGLE(kTangent)
-    POLYEST_SINGLE(kArcSine)
-    POLYEST_SINGLE(kArcCosine)
-    POLYEST_SINGLE(kArcTangent)
-    POLYEST_SINGLE(kHyperbolicSine)
-    POLYEST_SINGLE(kHyperbolicCosine)
-    POLYEST_SINGLE(kHyperbolicTangent)
-    POLYEST_SINGLE(kFloor)
-    POLYEST_SINGLE(kCeiling)
-    POLYEST_SINGLE(kAdd)
-    POLYEST_SINGLE(kSubtract)
-    POLYEST_SINGLE(kMultiply)
-    POLYEST_SINGLE(kDivide)
-    POLYEST_SINGLE(kPower)
-    POLYEST_SINGLE(kMinimum)
-    POLYEST_SINGLE(kMaximum)
-    POLYEST_SINGLE(kArcTangent2)
-    POLYEST_SINGLE(kHypotenuse)
-    POLYEST_SINGLE(kModulo)
-    POLYEST_SINGLE(kLess)
-    POLYEST_SINGLE(kLessOrEqual)
-    POLYEST_SINGLE(kEqual)
-    POLYEST_SINGLE(kNotEqual)
-    POLYEST_SINGLE(kAnd)
-    POLYEST_SINGLE(kOr)
-    POLYEST_SINGLE(kSelect)
-    POLYEST_SINGLE(kMultiplyAdd)
-    POLYEST_SINGLE(kMultiplySubtract)
-    POLYEST_SINGLE(kSubtractMultiplied)
-#undef POLYEST_SINGLE
+    case Operation::kConstant:
+    case Operation::kVariable:
+      POLYEST_CHECK(!"an operation that is carried out");
+      return nullptr;
     case Operation::kLookup:
       return Look<&Lookup::Value>;
     case Operation::kLookupSlopeX:
       return Look<&Lookup::SlopeX>;
     case Operation::kLookupSlopeY:
       return Look<&Lookup::SlopeY>;
-    case Operation::kConstant:
-    case Operation::kVariable:
-      break;
+    default:
+      return kSingleKernels[static_cast<size_t>(operation) - kFirstSingle];
   }
-  POLYEST_CHECK(!"an operation that is carried out");
-  return nullptr;
 }
 
 Kernel SelectPair(Operation inner, Operation operation, int position) {

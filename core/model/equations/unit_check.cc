@@ -48,6 +48,9 @@ class UnitCheck {
   Result Same(const SyntaxNode& node, int first, int second, std::string_view what);
   Result Plain(const SyntaxNode& node, std::string_view what);
   Result OfPower(const SyntaxNode& node);
+  Result OfProduct(const SyntaxNode& node);
+  // Infers the unit where all operands have the same: for a function of one, it is 1.
+  Result OfLikeOperands(const SyntaxNode& node);
 
   const Syntax& syntax_;
   const std::map<std::string, Unit>& units_;
@@ -104,6 +107,13 @@ UnitCheck::Result UnitCheck::OfPower(const SyntaxNode& node) {
                                      FormatUnit(*base.unit)));
 }
 
+UnitCheck::Result UnitCheck::OfProduct(const SyntaxNode& node) {
+  const std::optional<Unit>& a = Operand(node, 0).unit;
+  const std::optional<Unit>& b = Operand(node, 1).unit;
+  if (!a || !b) return Known{};
+  return Known{node.operation == Operation::kMultiply ? *a * *b : *a / *b, std::nullopt};
+}
+
 UnitCheck::Result UnitCheck::Infer(const SyntaxNode& node) {
   switch (node.operation) {
     case Operation::kConstant:
@@ -120,11 +130,27 @@ UnitCheck::Result UnitCheck::Infer(const SyntaxNode& node) {
       return Known{Operand(node, 0).unit, std::nullopt};
     case Operation::kNot:
     case Operation::kSign:
+    case Operation::kAnd:
+    case Operation::kOr:
       return Known{Unit(), std::nullopt};
     case Operation::kSquareRoot: {
       const std::optional<Unit>& unit = Operand(node, 0).unit;
       return Known{unit ? std::optional(Power(*unit, 0.5)) : std::nullopt, std::nullopt};
     }
+    case Operation::kMultiply:
+    case Operation::kDivide:
+      return OfProduct(node);
+    case Operation::kPower:
+      return OfPower(node);
+    case Operation::kLookup:
+      return Known{};
+    default:
+      return OfLikeOperands(node);
+  }
+}
+
+UnitCheck::Result UnitCheck::OfLikeOperands(const SyntaxNode& node) {
+  switch (node.operation) {
     case Operation::kAdd:
       return Same(node, 0, 1, "a sum");
     case Operation::kSubtract:
@@ -147,20 +173,6 @@ UnitCheck::Result UnitCheck::Infer(const SyntaxNode& node) {
     case Operation::kNotEqual:
       POLYEST_RETURN_IF_ERROR(Same(node, 0, 1, "a comparison").status());
       return Known{Unit(), std::nullopt};
-    case Operation::kAnd:
-    case Operation::kOr:
-      return Known{Unit(), std::nullopt};
-    case Operation::kMultiply:
-    case Operation::kDivide: {
-      const std::optional<Unit>& a = Operand(node, 0).unit;
-      const std::optional<Unit>& b = Operand(node, 1).unit;
-      if (!a || !b) return Known{};
-      return Known{node.operation == Operation::kMultiply ? *a * *b : *a / *b, std::nullopt};
-    }
-    case Operation::kPower:
-      return OfPower(node);
-    case Operation::kLookup:
-      return Known{};
     default:
       return Plain(node, "this function");
   }

@@ -157,6 +157,8 @@ std::string DescribeSignal(const v1::Input& input, const std::string& unit) {
   return "no signal";
 }
 
+namespace {
+
 // Describes the size of process noise or of a drift.
 template <class Noise>
 std::string DescribeSize(double value, const Noise& noise) {
@@ -164,12 +166,7 @@ std::string DescribeSize(double value, const Noise& noise) {
   return absl::StrCat("unknown, from ", Number(noise.lower()), " to ", Number(noise.upper()));
 }
 
-absl::StatusOr<Remarks> SummarizeProblem(const v1::Problem& problem,
-                                         const ResolvedProblem& resolved) {
-  POLYEST_ASSIGN_OR_RETURN(const ExpansionDesign design, DesignForPrior(resolved));
-  const ModelDescription& model = resolved.problem().model->description();
-  Remarks remarks;
-  Add("model", model.name, model.summary, remarks);
+void AddUnknowns(const v1::Problem& problem, const ResolvedProblem& resolved, Remarks& remarks) {
   for (int i = 0; i < problem.uncertain_size(); ++i) {
     const auto& parameter = problem.uncertain(i);
     Add("unknowns", parameter.name(),
@@ -194,6 +191,10 @@ absl::StatusOr<Remarks> SummarizeProblem(const v1::Problem& problem,
        std::map<std::string, std::string>(problem.derived().begin(), problem.derived().end())) {
     Add("derived", name, text, remarks);
   }
+}
+
+void AddSignals(const v1::Problem& problem, const ResolvedProblem& resolved, Remarks& remarks) {
+  const ModelDescription& model = resolved.problem().model->description();
   for (const Quantity& input : model.inputs) {
     Add("inputs", input.name, DescribeInput(problem, input), remarks);
   }
@@ -204,6 +205,18 @@ absl::StatusOr<Remarks> SummarizeProblem(const v1::Problem& problem,
         "noise " + DescribeNoise(measured.noise(), model.outputs[column].unit), remarks);
   }
   if (!problem.use_when().empty()) Add("useWhen", "", problem.use_when(), remarks);
+}
+
+}  // namespace
+
+absl::StatusOr<Remarks> SummarizeProblem(const v1::Problem& problem,
+                                         const ResolvedProblem& resolved) {
+  POLYEST_ASSIGN_OR_RETURN(const ExpansionDesign design, DesignForPrior(resolved));
+  const ModelDescription& model = resolved.problem().model->description();
+  Remarks remarks;
+  Add("model", model.name, model.summary, remarks);
+  AddUnknowns(problem, resolved, remarks);
+  AddSignals(problem, resolved, remarks);
   const ExpansionOptions& expansion = resolved.problem().expansion;
   const bool may_rise = expansion.adaptive && !expansion.order;
   Add("expansion", absl::StrCat("order ", design.basis->order(), may_rise ? " at first" : ""),
