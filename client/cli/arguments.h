@@ -8,14 +8,14 @@
 #include <variant>
 #include <vector>
 
+#include "client/cli/answer_format.h"
 #include "client/cli/place.h"
 #include "client/cli/screen.h"
+#include "client/cli/session_arguments.h"
 #include "client/paper/paper_command.h"
 #include "polyest/data_file.h"
 
 namespace polyest::internal {
-
-enum class Format { kTable, kJson, kJsonLines, kCsv };
 
 struct EstimateArguments {
   Place place;
@@ -33,18 +33,6 @@ struct ExplainArguments {
   DataFileOptions data_options;
   std::string session;       // its id, in place of the files; empty: none
   bool no_remedies = false;  // whether remedies of residuals are left untried
-};
-
-struct StreamArguments {
-  Place place;
-  std::string problem_file;
-  std::string data_file;  // "-": standard input
-  DataFileOptions data_options;
-  int batch_rows = 30;
-  double rate = 0;              // factor by which data are sent faster than measured; 0: at once
-  std::string session;          // its id; empty: the daemon chooses
-  double reorder_window_s = 0;  // within which rows may be out of order; 0: they may not
-  Format format = Format::kTable;
 };
 
 struct PropagateArguments {
@@ -194,53 +182,6 @@ struct RegularizationArguments {
   int points = 0;       // 0: the default
   std::string plot_file;
   Format format = Format::kTable;
-};
-
-struct ExportArguments {
-  Place place;
-  std::string session;  // its id
-  std::string file;
-};
-
-struct ImportArguments {
-  Place place;
-  std::string file;
-  std::string session;  // its id in this daemon; empty: the id that it had
-};
-
-struct DeleteArguments {
-  Place place;
-  std::string session;  // its id
-};
-
-struct ListArguments {
-  Place place;
-  Format format = Format::kTable;
-};
-
-struct NodesArguments {
-  Place place;
-  std::string action;  // "drain"; empty: the nodes are listed
-  std::string node;    // the one to drain: its number, its name or its address
-  Format format = Format::kTable;
-};
-
-struct WatchArguments {
-  Place place;
-  std::string session;  // its id
-  bool once = false;
-  Format format = Format::kTable;
-};
-
-struct BackupArguments {
-  Place place;
-  std::string output_file;
-};
-
-struct TopArguments {
-  Place place;
-  bool once = false;
-  double interval_s = 2;
 };
 
 using Command =
