@@ -9,6 +9,7 @@
 #include "client/cli/commands.h"
 #include "client/cli/data_input.h"
 #include "client/cli/exit_status.h"
+#include "client/cli/input_files.h"
 #include "client/cli/problem_input.h"
 #include "client/cli/screen.h"
 #include "client/cli/text_table.h"
@@ -21,6 +22,7 @@
 #include "proto/wire/check/problem_summary.h"
 #include "proto/wire/convert/measurements.h"
 #include "proto/wire/convert/problem.h"
+#include "proto/wire/convert/wire_fields.h"
 #include "proto/wire/json/json_format.h"
 
 namespace polyest::internal {
@@ -47,13 +49,13 @@ struct Findings {
 
 // Reads the rows that are valid and adds the errors of the others to the findings.
 std::optional<v1::Measurements> ReadRows(const std::string& file, const DataColumns& columns,
-                                         Findings& findings) {
+                                         DataInFile& read, Findings& findings) {
   int refused = 0;
   const auto note = [&](const absl::Status& refusal) {
     if (++refused <= kMaxLines) findings.AddError(refusal);
     return absl::OkStatus();
   };
-  auto data = ReadData(file, columns, note);
+  auto data = ReadData(file, columns, read, note);
   if (!data.ok()) findings.AddError(data.status());
   if (refused > kMaxLines) {
     findings.unlisted = refused - kMaxLines;
@@ -86,9 +88,9 @@ absl::Status CheckRecord(const ResolvedProblem& problem, const v1::Measurements&
 }
 
 // Adds the summary of a problem without errors and of its data, and warnings of both.
-void AddSummary(const CheckArguments& arguments, const v1::Problem& problem,
-                const ModelLibrary& models, const std::optional<v1::Measurements>& data,
-                std::ostream& out, Findings& findings) {
+void AddSummary(const InputFiles& files, const v1::Problem& problem, const ModelLibrary& models,
+                const std::optional<v1::Measurements>& data, std::ostream& out,
+                Findings& findings) {
   const auto resolved = ToProblem(problem, models);
   POLYEST_CHECK(resolved.ok());
   std::ostringstream summary;
@@ -97,7 +99,7 @@ void AddSummary(const CheckArguments& arguments, const v1::Problem& problem,
   if (remarks.ok()) {
     Print(*remarks, summary);
   } else {
-    findings.AddError(remarks.status(), arguments.problem_file);
+    findings.AddError(remarks.status(), files.problem);
   }
   if (problem.measured().empty()) {
     findings.warnings.emplace_back(
@@ -106,7 +108,7 @@ void AddSummary(const CheckArguments& arguments, const v1::Problem& problem,
   }
   if (data) {
     const absl::Status checked = CheckRecord(*resolved, *data, findings, summary);
-    if (!checked.ok()) findings.AddError(checked, arguments.data_file);
+    if (!checked.ok()) findings.AddError(InFiles(WireFields(checked), files));
   }
   findings.summary = summary.str();
 }
@@ -131,12 +133,13 @@ Findings Check(const CheckArguments& arguments, std::ostream& out) {
   for (const absl::Status& refusal : CheckProblem(*problem, *models)) {
     findings.AddError(refusal, arguments.problem_file);
   }
+  InputFiles files{.problem = arguments.problem_file};
   std::optional<v1::Measurements> data;
   if (!arguments.data_file.empty()) {
     data = ReadRows(arguments.data_file, DataColumnsFor(*problem, *models, arguments.data_options),
-                    findings);
+                    files.data, findings);
   }
-  if (findings.errors.empty()) AddSummary(arguments, *problem, *models, data, out, findings);
+  if (findings.errors.empty()) AddSummary(files, *problem, *models, data, out, findings);
   return findings;
 }
 

@@ -10,6 +10,7 @@
 #include "client/cli/csv_field.h"
 #include "client/cli/estimate_format.h"
 #include "client/cli/exit_status.h"
+#include "client/cli/input_files.h"
 #include "client/cli/model_comparison.h"
 #include "client/cli/number_format.h"
 #include "client/cli/problem_input.h"
@@ -27,15 +28,15 @@ struct Contestant : Assessment {
 absl::StatusOr<Contestant> Assess(const std::string& file, const CompareArguments& arguments,
                                   Backend& backend) {
   v1::Experiment experiment;
-  const std::string& data = arguments.files.back();
-  POLYEST_RETURN_IF_ERROR(
-      ReadProblemAndData(file, data, arguments.place, *experiment.mutable_problem(),
-                         *experiment.mutable_measurements(), arguments.data_options));
+  POLYEST_ASSIGN_OR_RETURN(InputFiles files,
+                           ReadProblemAndData(file, arguments.files.back(), arguments.place,
+                                              experiment, arguments.data_options));
+  files.record = files.data;  // some rows of which are held out
   auto weighed = Weigh(experiment, backend);
-  if (!weighed.ok()) return InFile(weighed.status(), file, data);
+  if (!weighed.ok()) return InFiles(weighed.status(), files);
   Contestant contestant{*std::move(weighed), file};
   const absl::Status scored = Score(experiment, arguments.hold_out, backend, contestant);
-  if (!scored.ok()) return InFile(scored, file, data);
+  if (!scored.ok()) return InFiles(scored, files);
   return contestant;
 }
 

@@ -2,6 +2,7 @@
 #include "client/cli/backend.h"
 #include "client/cli/commands.h"
 #include "client/cli/csv_field.h"
+#include "client/cli/input_files.h"
 #include "client/cli/number_format.h"
 #include "client/cli/problem_input.h"
 #include "core/common/status.h"
@@ -12,11 +13,11 @@ namespace {
 
 absl::StatusOr<v1::ComputeCostGridResponse> EvaluateCost(const CostArguments& arguments) {
   v1::ComputeCostGridRequest request;
-  POLYEST_RETURN_IF_ERROR(FillInput(arguments, request));
+  POLYEST_ASSIGN_OR_RETURN(const InputFiles files, FillInput(arguments, request));
   request.mutable_parameters()->Add(arguments.parameters.begin(), arguments.parameters.end());
   request.set_point_count(arguments.grid_points);
   auto response = MakeBackend(arguments.place)->ComputeCostGrid(request);
-  if (!response.ok()) return InInput(response.status(), arguments);
+  if (!response.ok()) return InFiles(response.status(), files);
   return response;
 }
 

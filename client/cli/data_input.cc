@@ -64,11 +64,12 @@ void TellOfDataFile(const std::string& found) {
 }
 
 absl::StatusOr<v1::Measurements> ReadData(const std::string& file, const DataColumns& columns,
-                                          RefusedLine refused) {
+                                          DataInFile& data, RefusedLine refused) {
   std::string found;
-  auto data = ReadDataFile(file, columns, refused, &found);
-  if (data.ok()) TellOfDataFile(found);
-  return data;
+  auto read = ReadDataFile(file, columns, refused, &found, &data.lines);
+  data.file = file;
+  if (read.ok()) TellOfDataFile(found);
+  return read;
 }
 
 }  // namespace polyest::internal

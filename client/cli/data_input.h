@@ -7,6 +7,7 @@
 #include <string>
 
 #include "client/cli/arguments.h"
+#include "client/cli/input_files.h"
 #include "core/external/model_library.h"
 #include "polyest/data_file.h"
 #include "polyest/v1/measurements.pb.h"
@@ -30,8 +31,9 @@ absl::StatusOr<DataColumns> DataColumnsFor(const v1::Problem& problem, const Pla
 // error. All commands that read data do so.
 void TellOfDataFile(const std::string& found);
 
-// Reads a whole file and says what has been found out about it.
+// Reads a whole file, says what has been found out about it, and fills in `data` with it.
 absl::StatusOr<v1::Measurements> ReadData(const std::string& file, const DataColumns& columns,
+                                          DataInFile& data,
                                           RefusedLine refused = StopAtRefusedLine);
 
 }  // namespace polyest::internal

@@ -13,6 +13,7 @@
 #include "client/cli/data_input.h"
 #include "client/cli/estimate_format.h"
 #include "client/cli/exit_status.h"
+#include "client/cli/input_files.h"
 #include "client/cli/number_format.h"
 #include "client/cli/problem_input.h"
 #include "client/cli/study_plots.h"
@@ -53,14 +54,14 @@ absl::Status AddCandidates(const DesignArguments& arguments,
 
 // Returns the error with the name of the file in front that it is about. A field of a candidate's
 // inputs is named as in the candidate's own file.
-absl::Status InInputFile(const absl::Status& status, const DesignArguments& arguments,
+absl::Status InInputFile(const absl::Status& status, const InputFiles& files,
                          const v1::ComputeExperimentDesignRequest& request) {
   const FieldPath field = FieldOf(status).value_or(FieldPath());
   int index = 0;
   if (!absl::IsInvalidArgument(status) || field.steps().size() < 2 ||
       field.steps()[0] != FieldStep("candidates") ||
       !absl::SimpleAtoi(field.steps()[1].text(), &index) || index >= request.candidates_size()) {
-    return InFile(status, arguments.problem_file, arguments.data_file);
+    return InFiles(status, files);
   }
   absl::string_view message = status.message();
   const std::string candidate = FieldPath{"candidates", index}.ToString() + ".";
@@ -74,13 +75,14 @@ absl::StatusOr<Design> DesignExperiment(const DesignArguments& arguments) {
   POLYEST_RETURN_IF_ERROR(CheckFilesAreNotSwapped(arguments.problem_file, arguments.data_file));
   POLYEST_ASSIGN_OR_RETURN(*request.mutable_subject()->mutable_experiment()->mutable_problem(),
                            ReadCheckedProblem(arguments.problem_file, arguments.place));
+  InputFiles files{.problem = arguments.problem_file};
   if (!arguments.data_file.empty()) {
     v1::Experiment& experiment = *request.mutable_subject()->mutable_experiment();
     POLYEST_ASSIGN_OR_RETURN(
         const DataColumns columns,
         DataColumnsFor(experiment.problem(), arguments.place, arguments.data_options));
     POLYEST_ASSIGN_OR_RETURN(*experiment.mutable_measurements(),
-                             ReadData(arguments.data_file, columns));
+                             ReadData(arguments.data_file, columns, files.data));
   }
   POLYEST_RETURN_IF_ERROR(AddCandidates(arguments, request));
   request.set_until_s(arguments.until_s);
@@ -88,7 +90,7 @@ absl::StatusOr<Design> DesignExperiment(const DesignArguments& arguments) {
   request.set_sample_count(arguments.samples);
   for (const std::string& output : arguments.outputs) request.add_possible()->set_output(output);
   auto response = MakeBackend(arguments.place)->ComputeExperimentDesign(request);
-  if (!response.ok()) return InInputFile(response.status(), arguments, request);
+  if (!response.ok()) return InInputFile(response.status(), files, request);
   return Plotted(*std::move(response), MakePlot, arguments.plot_file);
 }
 

@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "core/common/field_error.h"
-#include "polyest/v1/problem.pb.h"
 
 namespace polyest::internal {
 namespace {
@@ -31,14 +30,6 @@ std::string MessageOf(const absl::Status& status) {
     return absl::StrCat(option, ": ", SentenceOf(status));
   }
   return std::string(status.message());
-}
-
-bool IsFieldOfProblem(const FieldStep& step) {
-  const google::protobuf::Descriptor& problem = *v1::Problem::descriptor();
-  for (int i = 0; i < problem.field_count(); ++i) {
-    if (problem.field(i)->json_name() == step.text()) return true;
-  }
-  return false;
 }
 
 }  // namespace
@@ -76,17 +67,6 @@ int Report(const absl::Status& status, absl::string_view server, std::ostream& e
   if (exit_status == kExitServer) message = absl::StrCat("server ", server, ": ", message);
   err << "polyest: " << message << std::endl;
   return exit_status;
-}
-
-absl::Status InFile(const absl::Status& status, absl::string_view problem_file,
-                    absl::string_view data_file) {
-  const std::optional<FieldPath> field = FieldOf(status);
-  if (!absl::IsInvalidArgument(status) || !field || field->empty()) return status;
-  const FieldStep& first = field->steps().front();
-  const bool is_of_data = first == FieldStep("measurements");
-  if (!is_of_data && !IsFieldOfProblem(first)) return status;
-  return absl::InvalidArgumentError(
-      absl::StrCat(is_of_data ? data_file : problem_file, ": ", status.message()));
 }
 
 }  // namespace polyest::internal

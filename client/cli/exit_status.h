@@ -25,9 +25,4 @@ ExitStatus ExitStatusOf(const absl::Status& status, absl::string_view server);
 // Prints an error in one line and returns its exit status. `status` must not be OK.
 int Report(const absl::Status& status, absl::string_view server, std::ostream& err);
 
-// Returns the error with the name of the file in front, if it refuses a field of the problem or of
-// the measurements. Other errors stay unchanged: those of options, and those of reading a file.
-absl::Status InFile(const absl::Status& status, absl::string_view problem_file,
-                    absl::string_view data_file);
-
 }  // namespace polyest::internal

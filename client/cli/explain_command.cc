@@ -11,6 +11,7 @@
 #include "client/cli/estimate_format.h"
 #include "client/cli/exit_status.h"
 #include "client/cli/explain_input.h"
+#include "client/cli/input_files.h"
 #include "client/cli/number_format.h"
 #include "client/cli/problem_input.h"
 #include "client/cli/remedy_report.h"
@@ -204,7 +205,7 @@ absl::Status Explain(const ExplainArguments& arguments, std::ostream& out) {
   if (const double until_s = LongestRun(input); !open.empty() && until_s > 0) {
     const v1::Problem problem = WithoutStreamedInputs(input.problem, input.measurements);
     auto answer = backend->ComputeExperimentDesign(Alternatives(problem, until_s, input.rows));
-    if (!answer.ok()) return InInput(answer.status(), arguments);
+    if (!answer.ok()) return InFiles(answer.status(), input.files);
     design = *std::move(answer);
   }
   backend.reset();  // erases its progress line
@@ -223,9 +224,9 @@ absl::Status Explain(const ExplainArguments& arguments, std::ostream& out) {
   backend = MakeBackend(arguments.place);
   const absl::StatusOr<RemedyTrial> trial = TryOnRecord(input, *backend);
   backend.reset();
-  if (!trial.ok()) return InInput(trial.status(), arguments);
+  if (!trial.ok()) return InFiles(trial.status(), input.files);
   PrintTrial(*trial, out);
-  return InInput(trial->ended, arguments);
+  return InFiles(trial->ended, input.files);
 }
 
 }  // namespace

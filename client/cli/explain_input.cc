@@ -123,12 +123,12 @@ absl::StatusOr<ExplainInput> ReadExplainInput(const ExplainArguments& arguments,
   if (!arguments.session.empty()) return ReadSession(arguments, backend);
   v1::ComputeEstimateRequest request;
   v1::Experiment& experiment = *request.mutable_subject()->mutable_experiment();
-  POLYEST_RETURN_IF_ERROR(ReadProblemAndData(
-      arguments.problem_file, arguments.data_file, arguments.place, *experiment.mutable_problem(),
-      *experiment.mutable_measurements(), arguments.data_options));
-  auto response = backend.ComputeEstimate(request);
-  if (!response.ok()) return InInput(response.status(), arguments);
   ExplainInput input;
+  POLYEST_ASSIGN_OR_RETURN(
+      input.files, ReadProblemAndData(arguments.problem_file, arguments.data_file, arguments.place,
+                                      experiment, arguments.data_options));
+  auto response = backend.ComputeEstimate(request);
+  if (!response.ok()) return InFiles(response.status(), input.files);
   input.problem = std::move(*experiment.mutable_problem());
   input.estimate = std::move(*response->mutable_estimate());
   input.measurements = std::move(*experiment.mutable_measurements());

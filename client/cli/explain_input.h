@@ -6,6 +6,7 @@
 
 #include "client/cli/arguments.h"
 #include "client/cli/backend.h"
+#include "client/cli/input_files.h"
 #include "polyest/v1/estimate.pb.h"
 #include "polyest/v1/measurements.pb.h"
 #include "polyest/v1/problem.pb.h"
@@ -19,7 +20,8 @@ struct ExplainInput {
   // other sessions the times and streamed inputs of the first run only, or nothing if the problem
   // has no streamed input.
   v1::Measurements measurements;
-  int rows = 0;  // number of rows of the record; approximate for a session
+  InputFiles files;  // none for a session
+  int rows = 0;      // number of rows of the record; approximate for a session
 };
 
 // Reads the input. `backend` computes the estimate from files; a session is read from its daemon.

@@ -13,6 +13,7 @@
 #include "client/cli/csv_field.h"
 #include "client/cli/estimate_format.h"
 #include "client/cli/fit_plot.h"
+#include "client/cli/input_files.h"
 #include "client/cli/number_format.h"
 #include "client/cli/problem_input.h"
 #include "client/cli/text_table.h"
@@ -28,14 +29,14 @@ constexpr int kShownLags = 3;
 absl::StatusOr<v1::PredictResponse> Fit(const FitArguments& arguments) {
   POLYEST_RETURN_IF_ERROR(CheckPlotFile(arguments.plot_file));
   v1::PredictRequest request;
-  POLYEST_RETURN_IF_ERROR(FillInput(arguments, request));
+  POLYEST_ASSIGN_OR_RETURN(InputFiles files, FillInput(arguments, request));
   if (!arguments.validation_file.empty()) {
     POLYEST_ASSIGN_OR_RETURN(const v1::Problem problem,
                              ProblemOf(request.subject(), arguments.place));
     POLYEST_ASSIGN_OR_RETURN(const DataColumns columns,
                              DataColumnsFor(problem, arguments.place, arguments.data_options));
     POLYEST_ASSIGN_OR_RETURN(*request.mutable_record(),
-                             ReadData(arguments.validation_file, columns));
+                             ReadData(arguments.validation_file, columns, files.record));
   }
   request.mutable_outputs()->Add(arguments.outputs.begin(), arguments.outputs.end());
   request.mutable_probabilities()->Add(arguments.probabilities.begin(),
@@ -46,7 +47,7 @@ absl::StatusOr<v1::PredictResponse> Fit(const FitArguments& arguments) {
   request.set_smoothed(arguments.smoothed);
   request.set_forecast_s(arguments.forecast_s);
   auto response = MakeBackend(arguments.place)->Predict(request);
-  if (!response.ok()) return InInput(response.status(), arguments);
+  if (!response.ok()) return InFiles(response.status(), files);
   return Plotted(*std::move(response), MakePlot, arguments.plot_file);
 }
 

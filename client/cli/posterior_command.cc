@@ -11,6 +11,7 @@
 #include "client/cli/commands.h"
 #include "client/cli/csv_field.h"
 #include "client/cli/estimate_format.h"
+#include "client/cli/input_files.h"
 #include "client/cli/name_list.h"
 #include "client/cli/number_format.h"
 #include "client/cli/problem_input.h"
@@ -38,7 +39,7 @@ absl::StatusOr<v1::ComputePosteriorResponse> GetPosterior(const PosteriorArgumen
     pair.set_first(names[0]);
     pair.set_second(names[1]);
   }
-  POLYEST_RETURN_IF_ERROR(FillInput(arguments, request));
+  POLYEST_ASSIGN_OR_RETURN(const InputFiles files, FillInput(arguments, request));
   request.mutable_probabilities()->Add(arguments.probabilities.begin(),
                                        arguments.probabilities.end());
   request.set_sample_count(arguments.samples);
@@ -47,7 +48,7 @@ absl::StatusOr<v1::ComputePosteriorResponse> GetPosterior(const PosteriorArgumen
     request.set_density_bin_count(arguments.plot_file.empty() ? kSketchWidth : kPlottedBins);
   }
   auto response = MakeBackend(arguments.place)->ComputePosterior(request);
-  if (!response.ok()) return InInput(response.status(), arguments);
+  if (!response.ok()) return InFiles(response.status(), files);
   return Plotted(*std::move(response), MakePlot, arguments.plot_file);
 }
 

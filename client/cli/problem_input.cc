@@ -32,14 +32,18 @@ absl::Status CheckFilesAreNotSwapped(const std::string& problem_file,
                                                  ", a problem: swap them"));
 }
 
-absl::Status ReadProblemAndData(const std::string& problem_file, const std::string& data_file,
-                                const Place& place, v1::Problem& problem,
-                                v1::Measurements& measurements, const DataFileOptions& options) {
+absl::StatusOr<InputFiles> ReadProblemAndData(const std::string& problem_file,
+                                              const std::string& data_file, const Place& place,
+                                              v1::Experiment& experiment,
+                                              const DataFileOptions& options) {
   POLYEST_RETURN_IF_ERROR(CheckFilesAreNotSwapped(problem_file, data_file));
+  InputFiles files{.problem = problem_file};
+  v1::Problem& problem = *experiment.mutable_problem();
   POLYEST_ASSIGN_OR_RETURN(problem, ReadCheckedProblem(problem_file, place));
   POLYEST_ASSIGN_OR_RETURN(const DataColumns columns, DataColumnsFor(problem, place, options));
-  POLYEST_ASSIGN_OR_RETURN(measurements, ReadData(data_file, columns));
-  return absl::OkStatus();
+  POLYEST_ASSIGN_OR_RETURN(*experiment.mutable_measurements(),
+                           ReadData(data_file, columns, files.data));
+  return files;
 }
 
 absl::StatusOr<v1::Problem> ProblemOf(const v1::Subject& subject, const Place& place) {

@@ -11,9 +11,8 @@
 
 #include "client/cli/arguments.h"
 #include "client/cli/data_input.h"
-#include "client/cli/exit_status.h"
+#include "client/cli/input_files.h"
 #include "core/common/status.h"
-#include "polyest/v1/measurements.pb.h"
 #include "polyest/v1/problem.pb.h"
 #include "polyest/v1/study_service.pb.h"
 
@@ -27,11 +26,11 @@ absl::StatusOr<v1::Problem> ReadCheckedProblem(const std::string& path, const Pl
 // Refuses two files with INVALID_ARGUMENT when the first is CSV data and the second a problem.
 absl::Status CheckFilesAreNotSwapped(const std::string& problem_file, const std::string& data_file);
 
-// Reads a checked problem and the data for it.
-absl::Status ReadProblemAndData(const std::string& problem_file, const std::string& data_file,
-                                const Place& place, v1::Problem& problem,
-                                v1::Measurements& measurements,
-                                const DataFileOptions& options = {});
+// Reads a checked problem and the data for it. Returns their files.
+absl::StatusOr<InputFiles> ReadProblemAndData(const std::string& problem_file,
+                                              const std::string& data_file, const Place& place,
+                                              v1::Experiment& experiment,
+                                              const DataFileOptions& options = {});
 
 // Returns what the arguments say about the data file; the defaults if their command says nothing.
 template <typename Arguments>
@@ -41,32 +40,21 @@ DataFileOptions DataOptionsOf(const Arguments& arguments) {
 }
 
 // Fills in the subject of a request: the session that the arguments name, if their command takes
-// one, or else the problem and the data in their two files.
+// one, or else the problem and the data in their two files, which it returns.
 template <typename Arguments, typename Request>
-absl::Status FillInput(const Arguments& arguments, Request& request) {
+absl::StatusOr<InputFiles> FillInput(const Arguments& arguments, Request& request) {
   if constexpr (requires { arguments.session; }) {
     if (!arguments.session.empty()) {
       request.mutable_subject()->set_session(absl::StrCat("sessions/", arguments.session));
-      return absl::OkStatus();
+      return InputFiles();
     }
   }
-  v1::Experiment& experiment = *request.mutable_subject()->mutable_experiment();
   return ReadProblemAndData(arguments.problem_file, arguments.data_file, arguments.place,
-                            *experiment.mutable_problem(), *experiment.mutable_measurements(),
+                            *request.mutable_subject()->mutable_experiment(),
                             DataOptionsOf(arguments));
 }
 
 // Returns the problem of a subject that FillInput has filled in; asks the daemon for a session's.
 absl::StatusOr<v1::Problem> ProblemOf(const v1::Subject& subject, const Place& place);
-
-// Returns the error with the name of the file in front, if it refuses a field of a file (InFile).
-// Errors about a session stay unchanged.
-template <typename Arguments>
-absl::Status InInput(const absl::Status& status, const Arguments& arguments) {
-  if constexpr (requires { arguments.session; }) {
-    if (!arguments.session.empty()) return status;
-  }
-  return InFile(status, arguments.problem_file, arguments.data_file);
-}
 
 }  // namespace polyest::internal

@@ -9,6 +9,7 @@
 #include "client/cli/commands.h"
 #include "client/cli/csv_field.h"
 #include "client/cli/estimate_format.h"
+#include "client/cli/input_files.h"
 #include "client/cli/number_format.h"
 #include "client/cli/problem_input.h"
 #include "client/cli/study_plots.h"
@@ -22,7 +23,7 @@ namespace {
 absl::StatusOr<v1::ComputeCostProfilesResponse> Profile(const ProfileArguments& arguments) {
   POLYEST_RETURN_IF_ERROR(CheckPlotFile(arguments.plot_file));
   v1::ComputeCostProfilesRequest request;
-  POLYEST_RETURN_IF_ERROR(FillInput(arguments, request));
+  POLYEST_ASSIGN_OR_RETURN(const InputFiles files, FillInput(arguments, request));
   request.mutable_parameters()->Add(arguments.parameters.begin(), arguments.parameters.end());
   request.set_point_count(arguments.points);
   // A table needs fewer points than a plot.
@@ -30,7 +31,7 @@ absl::StatusOr<v1::ComputeCostProfilesResponse> Profile(const ProfileArguments& 
     request.set_point_count(kTablePoints);
   }
   auto response = MakeBackend(arguments.place)->ComputeCostProfiles(request);
-  if (!response.ok()) return InInput(response.status(), arguments);
+  if (!response.ok()) return InFiles(response.status(), files);
   return Plotted(*std::move(response), MakePlot, arguments.plot_file);
 }
 

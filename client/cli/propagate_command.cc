@@ -10,6 +10,7 @@
 #include "client/cli/csv_field.h"
 #include "client/cli/estimate_format.h"
 #include "client/cli/exit_status.h"
+#include "client/cli/input_files.h"
 #include "client/cli/number_format.h"
 #include "client/cli/problem_input.h"
 #include "client/cli/text_table.h"
@@ -25,7 +26,7 @@ absl::StatusOr<v1::ComputePropagationResponse> Propagate(const PropagateArgument
   request.set_until_s(arguments.until_s);
   request.set_step_s(arguments.step_s);
   auto response = MakeBackend(arguments.place)->ComputePropagation(request);
-  if (!response.ok()) return InFile(response.status(), arguments.problem_file, "");
+  if (!response.ok()) return InFiles(response.status(), {.problem = arguments.problem_file});
   return response;
 }
 

@@ -11,6 +11,10 @@
 namespace polyest::internal {
 namespace {
 
+bool HasRecord(const FieldStep& field) {
+  return field == FieldStep("measurements") || field == FieldStep("record");
+}
+
 bool HasRows(const FieldStep& field) {
   return field == FieldStep("timeS") || field == FieldStep("run") || field == FieldStep("values");
 }
@@ -22,10 +26,9 @@ std::optional<int> RefusedRow(const absl::Status& status) {
   if (!absl::IsInvalidArgument(status) || !field) return std::nullopt;
   const std::vector<FieldStep>& steps = field->steps();
   int row = 0;
-  const bool found = steps.size() >= 3 && steps.front() == FieldStep("measurements") &&
-                     HasRows(steps[steps.size() - 2]) &&
-                     steps.back().kind() == FieldStep::Kind::kIndex &&
-                     absl::SimpleAtoi(steps.back().text(), &row);
+  const bool found =
+      steps.size() >= 3 && HasRecord(steps.front()) && HasRows(steps[steps.size() - 2]) &&
+      steps.back().kind() == FieldStep::Kind::kIndex && absl::SimpleAtoi(steps.back().text(), &row);
   return found ? std::optional<int>(row) : std::nullopt;
 }
 
@@ -37,11 +40,11 @@ absl::Status AtRowOfData(const absl::Status& status, int64_t rows_before) {
   for (size_t i = 0; i + 1 < steps.size(); ++i) field = field.Then({steps[i]});
   field = field.Then({rows_before + *row});
   absl::string_view sentence = SentenceOf(status);
-  if (!absl::ConsumePrefix(&sentence, absl::StrCat("row ", *row))) {
+  if (!absl::ConsumePrefix(&sentence, RowInWords(*row))) {
     return InvalidField(field, sentence);
   }
   return NamedInWords(
-      field, absl::InvalidArgumentError(absl::StrCat("row ", rows_before + *row, sentence)));
+      field, absl::InvalidArgumentError(absl::StrCat(RowInWords(rows_before + *row), sentence)));
 }
 
 }  // namespace polyest::internal

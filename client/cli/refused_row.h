@@ -9,8 +9,8 @@
 
 namespace polyest::internal {
 
-// Returns the row, from 0, of the measurements that a status refuses; nothing if it refuses
-// something else.
+// Returns the row, from 0, of the measurements or of the record to predict that a status refuses;
+// nothing if it refuses something else.
 std::optional<int> RefusedRow(const absl::Status& status);
 
 // Returns the refusal of a row of a batch as that of a row of the data, which has so many rows

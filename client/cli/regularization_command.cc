@@ -8,6 +8,7 @@
 #include "client/cli/csv_field.h"
 #include "client/cli/estimate_format.h"
 #include "client/cli/exit_status.h"
+#include "client/cli/input_files.h"
 #include "client/cli/number_format.h"
 #include "client/cli/problem_input.h"
 #include "client/cli/regularization_plot.h"
@@ -24,7 +25,7 @@ using Sweep = v1::ComputeRegularizationSweepResponse;
 absl::StatusOr<Sweep> SweepRegularization(const RegularizationArguments& arguments) {
   POLYEST_RETURN_IF_ERROR(CheckPlotFile(arguments.plot_file));
   v1::ComputeRegularizationSweepRequest request;
-  POLYEST_RETURN_IF_ERROR(FillInput(arguments, request));
+  POLYEST_ASSIGN_OR_RETURN(const InputFiles files, FillInput(arguments, request));
   request.set_lowest(arguments.lowest);
   request.set_highest(arguments.highest);
   request.set_point_count(arguments.points);
@@ -33,7 +34,7 @@ absl::StatusOr<Sweep> SweepRegularization(const RegularizationArguments& argumen
     request.set_point_count(kTablePoints);
   }
   auto response = MakeBackend(arguments.place)->ComputeRegularizationSweep(request);
-  if (!response.ok()) return InInput(response.status(), arguments);
+  if (!response.ok()) return InFiles(response.status(), files);
   return Plotted(*std::move(response), MakePlot, arguments.plot_file);
 }
 

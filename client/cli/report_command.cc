@@ -7,6 +7,7 @@
 #include "client/cli/backend.h"
 #include "client/cli/commands.h"
 #include "client/cli/exit_status.h"
+#include "client/cli/input_files.h"
 #include "client/cli/problem_input.h"
 #include "client/cli/report_page.h"
 #include "client/plot/output_file.h"
@@ -58,7 +59,7 @@ absl::Status MakeReport(const ReportArguments& arguments) {
   POLYEST_RETURN_IF_ERROR(CheckOutputFile("--output", arguments.output_file));
   // Any of the requests has the subject.
   v1::ComputeEstimateRequest input;
-  POLYEST_RETURN_IF_ERROR(FillInput(arguments, input));
+  POLYEST_ASSIGN_OR_RETURN(const InputFiles files, FillInput(arguments, input));
   ReportContent content;
   content.subject = arguments.session.empty()
                         ? absl::StrCat(arguments.problem_file, ", ", arguments.data_file)
@@ -68,7 +69,7 @@ absl::Status MakeReport(const ReportArguments& arguments) {
   content.version = POLYEST_VERSION;
   const auto backend = MakeBackend(arguments.place);
   const absl::Status computed = Compute(input.subject(), *backend, content);
-  if (!computed.ok()) return InInput(computed, arguments);
+  if (!computed.ok()) return InFiles(computed, files);
   return WriteOutputFile("--output", arguments.output_file, ReportPage(content));
 }
 

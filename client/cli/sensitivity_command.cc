@@ -11,6 +11,7 @@
 #include "client/cli/csv_field.h"
 #include "client/cli/estimate_format.h"
 #include "client/cli/exit_status.h"
+#include "client/cli/input_files.h"
 #include "client/cli/number_format.h"
 #include "client/cli/problem_input.h"
 #include "client/cli/study_plots.h"
@@ -33,7 +34,7 @@ absl::StatusOr<Analysis> AnalyzeSensitivity(const SensitivityArguments& argument
   request.set_step_s(arguments.step_s);
   request.mutable_outputs()->Add(arguments.outputs.begin(), arguments.outputs.end());
   auto response = MakeBackend(arguments.place)->ComputeSensitivity(request);
-  if (!response.ok()) return InFile(response.status(), arguments.problem_file, "");
+  if (!response.ok()) return InFiles(response.status(), {.problem = arguments.problem_file});
   return Plotted(*std::move(response), MakePlot, arguments.plot_file);
 }
 

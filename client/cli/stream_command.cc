@@ -19,6 +19,7 @@
 #include "client/cli/data_input.h"
 #include "client/cli/estimate_format.h"
 #include "client/cli/exit_status.h"
+#include "client/cli/input_files.h"
 #include "client/cli/interrupt.h"
 #include "client/cli/problem_input.h"
 #include "client/cli/progress_line.h"
@@ -126,6 +127,7 @@ class StreamCommand {
     auto reader = DataReader::Open(in, DataName(), columns);
     if (interrupted()) return std::nullopt;
     POLYEST_RETURN_IF_ERROR(reader.status());
+    reader_ = &*reader;
     // The first batch is read before the session is created, so that a file without any valid row
     // creates none.
     v1::Measurements first;
@@ -135,14 +137,18 @@ class StreamCommand {
     line_->Interject([&] { TellOfDataFile(reader->Found()); });
     auto session = WaitForSession();
     if (!session.ok() && interrupted()) return std::nullopt;
-    if (!session.ok()) return InFiles(session.status());
+    if (!session.ok()) return InInput(session.status());
     auto last = Send(*session, *reader, std::move(first), read);
-    if (!last.ok()) return InFiles(last.status());
+    if (!last.ok()) return InInput(last.status());
     return last;
   }
 
-  absl::Status InFiles(const absl::Status& status) const {
-    return InFile(status, arguments_.problem_file, DataName());
+  // Returns the error with its place in the files. In data that may be in any order, rows that the
+  // session had before are anywhere, so that the number of a row is not its place.
+  absl::Status InInput(const absl::Status& status) const {
+    const bool has_places = skipped_ == 0 || arguments_.reorder_window_s == 0;
+    return InFiles(status, {.problem = arguments_.problem_file,
+                            .data = {DataName(), has_places ? reader_->Lines() : RowLines()}});
   }
 
   // Opens the session. Waits and tries again while the daemon has no room for it.
@@ -223,7 +229,7 @@ class StreamCommand {
   }
 
   // Sends what comes before the row that the daemon refuses in the first of the batches that it has
-  // not taken, and returns the refusal with the row's number in the data and the number of rows
+  // not taken, and returns the refusal with the row's place in the data and the number of rows
   // kept. The run goes on, as it does after a bad line.
   absl::Status EndAtRefusal(const StreamSession& session, std::vector<v1::Measurements> refused,
                             absl::Status refusal) {
@@ -240,13 +246,13 @@ class StreamCommand {
         break;
       }
       if (!RefusedRow(sent)) {
-        Tell(AtRowOfData(refusal, rows_before).message());
+        Tell(InInput(AtRowOfData(refusal, rows_before)).message());
         return sent;
       }
       refusal = sent;
     }
     if (!absl::IsInvalidArgument(refusal) && !absl::IsResourceExhausted(refusal)) return refusal;
-    return WithRowsKept(InFiles(AtRowOfData(refusal, rows_before)), session, kept);
+    return WithRowsKept(InInput(AtRowOfData(refusal, rows_before)), session, kept);
   }
 
   absl::Status SendAlone(const StreamSession& session, const v1::Measurements& batch) {
@@ -319,7 +325,8 @@ class StreamCommand {
   StreamProgress progress_;
   // Rows left out at the beginning of the data, because the session has them, and rows sent.
   int64_t skipped_ = 0, sent_ = 0;
-  ProgressLine* line_ = nullptr;  // valid during Run()
+  ProgressLine* line_ = nullptr;        // valid during Run()
+  const DataReader* reader_ = nullptr;  // valid during Read(), once it is open
 };
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <cerrno>
 #include <cstring>
 #include <fstream>
+#include <iterator>
 #include <limits>
 #include <optional>
 #include <utility>
@@ -60,6 +61,18 @@ DataColumns ColumnsOf(const v1::Problem& problem) {
   return columns;
 }
 
+void RowLines::Add(int64_t line) {
+  if (line != LineOf(rows_ - 1) + 1 || rows_ == 0) pieces_.push_back({rows_, line});
+  ++rows_;
+}
+
+int64_t RowLines::LineOf(int64_t row) const {
+  if (row < 0 || row >= rows_) return 0;
+  const auto after = std::ranges::upper_bound(pieces_, row, {}, &Piece::first_row);
+  const Piece& piece = *std::prev(after);
+  return piece.first_line + row - piece.first_row;
+}
+
 class DataReader::Reader {
  public:
   Reader(std::istream& in, std::string name, DataColumns known)
@@ -72,6 +85,8 @@ class DataReader::Reader {
   }
 
   absl::Status Read(int64_t max_rows, v1::Measurements& batch, RefusedLine refused);
+
+  const RowLines& Lines() const { return row_lines_; }
 
   std::string Found() const {
     if (!rows_) return "";
@@ -91,6 +106,7 @@ class DataReader::Reader {
   std::vector<DataColumn> columns_;
   std::optional<RowParser> rows_;  // none before the first line below the header is read
   int64_t units_line_ = 0;
+  RowLines row_lines_;
   bool has_run_ = false;
   bool any_refused_ = false;
   std::vector<v1::Measurements::Channel*> channels_;  // of the batch being read
@@ -144,6 +160,7 @@ void DataReader::Reader::AddRow(v1::Measurements& batch) {
   }
   batch.mutable_time_s()->Add(rows_->clock().time_s());
   if (has_run_) batch.add_run(rows_->clock().run());
+  row_lines_.Add(lines_.line());
 }
 
 absl::Status DataReader::Reader::Read(int64_t max_rows, v1::Measurements& batch,
@@ -196,8 +213,11 @@ absl::Status DataReader::Read(int64_t max_rows, v1::Measurements& batch, Refused
 
 std::string DataReader::Found() const { return reader_->Found(); }
 
+const RowLines& DataReader::Lines() const { return reader_->Lines(); }
+
 absl::StatusOr<v1::Measurements> ReadDataFile(const std::string& path, const DataColumns& columns,
-                                              RefusedLine refused, std::string* found) {
+                                              RefusedLine refused, std::string* found,
+                                              RowLines* lines) {
   POLYEST_RETURN_IF_ERROR(CheckIsNoFolder(path));
   std::ifstream in(path, std::ios::binary);
   if (!in) {
@@ -207,6 +227,7 @@ absl::StatusOr<v1::Measurements> ReadDataFile(const std::string& path, const Dat
   POLYEST_ASSIGN_OR_RETURN(DataReader reader, DataReader::Open(in, path, columns, refused));
   auto data = reader.Read(std::numeric_limits<int64_t>::max(), refused);
   if (found != nullptr) *found = reader.Found();
+  if (lines != nullptr) *lines = reader.Lines();
   return data;
 }
 

@@ -110,6 +110,8 @@ absl::Status CheckRange(const FieldPath& field, int64_t value, int64_t least, in
   return InvalidField(field, absl::StrCat(value, " must be from ", least, " to ", most));
 }
 
+std::string RowInWords(int64_t row) { return absl::StrCat("row ", row, " (counted from 0)"); }
+
 absl::Status NamedInWords(const FieldPath& field, const absl::Status& status) {
   return status.ok() ? status : WithField(status, field, /*shown=*/false);
 }

@@ -76,9 +76,12 @@ absl::Status FieldError(absl::StatusCode code, const FieldPath& field, absl::str
 absl::Status InvalidField(const FieldPath& field, absl::string_view sentence);
 // Returns OK for an integer from `least` to `most`, or an InvalidField that says so.
 absl::Status CheckRange(const FieldPath& field, int64_t value, int64_t least, int64_t most);
-// Returns a status that refuses a field whose sentence already names the place ("row 3, column x:
-// …"): the path is in the payload only.
+// Returns a status that refuses a field whose sentence already names the place ("row 3 (counted
+// from 0), column x: …"): the path is in the payload only.
 absl::Status NamedInWords(const FieldPath& field, const absl::Status& status);
+// Returns how such a sentence begins that is about a row: "row 3 (counted from 0)". Whoever knows
+// the row's place in a file puts that in its stead.
+std::string RowInWords(int64_t row);
 
 // Returns the field that a status refuses; nothing if it names none.
 std::optional<FieldPath> FieldOf(const absl::Status& status);

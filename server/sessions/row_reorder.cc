@@ -1,5 +1,6 @@
 #include "server/sessions/row_reorder.h"
 
+#include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 #include <absl/strings/str_join.h>
 
@@ -9,6 +10,7 @@
 #include <limits>
 #include <utility>
 
+#include "core/common/field_error.h"
 #include "core/common/status.h"
 #include "proto/wire/refusal/refusal.h"
 
@@ -37,8 +39,11 @@ std::string ColumnsIn(const Samples& batch, size_t row) {
   return names.empty() ? "t" : absl::StrJoin(names, ", ");
 }
 
+// Refuses a row, which the sentence is about and continues.
 absl::Status RefusedRow(const char* field, size_t row, const std::string& sentence) {
-  return NamedInWords(FieldPath{"measurements", field, row}, absl::InvalidArgumentError(sentence));
+  return NamedInWords(
+      FieldPath{"measurements", field, row},
+      absl::InvalidArgumentError(absl::StrCat(RowInWords(static_cast<int64_t>(row)), sentence)));
 }
 
 // Writes the samples of one row over those of another.
@@ -125,8 +130,8 @@ absl::Status RowReorder::AddRow(const Samples& batch, size_t row, const std::vec
     if (Holds(held_, place, places[i]) || !std::isnan(values[places[i]])) {
       return RefusedRow(
           "time_s", row,
-          absl::StrFormat("row %d, column %s: there is another sample at t = %.17g s of run %d",
-                          row, batch.columns[i].name, place.time_s, place.run));
+          absl::StrFormat(", column %s: there is another sample at t = %.17g s of run %d",
+                          batch.columns[i].name, place.time_s, place.run));
     }
     values[places[i]] = batch.columns[i].value[row];
   }
@@ -137,25 +142,24 @@ absl::Status RowReorder::CheckPlace(const Samples& batch, size_t row, const Samp
                                     const Step& step) const {
   if (step.any ? place.run < step.newest.run : place.run != 0) {
     const std::string before = step.any ? absl::StrFormat(" after %d", step.newest.run) : "";
-    return RefusedRow(
-        "run", row,
-        absl::StrFormat("row %d, column run: %d%s; runs start at 0 and never decrease", row,
-                        place.run, before));
+    return RefusedRow("run", row,
+                      absl::StrFormat(", column run: %d%s; runs start at 0 and never decrease",
+                                      place.run, before));
   }
   if (!step.any || place.run > step.newest.run) return absl::OkStatus();
   if (step.run_ended) {
-    return RefusedRow("run", row,
-                      absl::StrFormat("row %d: run %d has ended; further rows belong to a new run",
-                                      row, place.run));
+    return RefusedRow(
+        "run", row,
+        absl::StrFormat(": run %d has ended; further rows belong to a new run", place.run));
   }
   if (!IsDue(place, step)) return absl::OkStatus();
   return RefusedRow(
       "time_s", row,
       absl::StrFormat(
-          "row %d, column %s: t = %.17g s comes too late: the newest row is at %.17g "
+          ", column %s: t = %.17g s comes too late: the newest row is at %.17g "
           "s, and the rows more than reorderWindowS = %g s before it, up to %.17g s, have "
           "been released to the estimator",
-          row, ColumnsIn(batch, row), place.time_s, step.newest.time_s, window_s_,
+          ColumnsIn(batch, row), place.time_s, step.newest.time_s, window_s_,
           step.newest.time_s - window_s_));
 }
 

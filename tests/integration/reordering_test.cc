@@ -124,7 +124,7 @@ TEST_F(ReorderingTest, RefusesWhatComesLaterThanTheWindow) {
   ASSERT_TRUE(Add("sessions/rig", 1, Only(0, BothOutputs(0, 40))).ok());
   const grpc::Status late = Add("sessions/rig", 2, Only(1, BothOutputs(20, 40)));
   EXPECT_EQ(late.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
-  EXPECT_THAT(late.error_message(), HasSubstr("row 0, column v: t = 1.05"));
+  EXPECT_THAT(late.error_message(), HasSubstr("row 0 (counted from 0), column v: t = 1.05"));
   const grpc::Status again = Add("sessions/rig", 2, Only(1, BothOutputs(30, 40)));
   EXPECT_TRUE(again.ok()) << again.error_message();
 }

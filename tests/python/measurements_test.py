@@ -61,7 +61,7 @@ def test_what_a_masked_array_hides_is_missing(kind):
 def test_a_hidden_time_is_no_time():
     dates = np.array(["2026-01-31", "2026-02-01"], dtype="datetime64[s]")
     for times in (np.array([0.0, 1.0]), dates):
-        with pytest.raises(polyest.InvalidInput, match="t: row 1 has no time"):
+        with pytest.raises(polyest.InvalidInput, match=r"t: row 1 \(counted from 0\) has no time"):
             converter().convert({"t": np.ma.array(times, mask=[False, True]), "x": [1.0, 2.0]})
 
 
@@ -160,7 +160,8 @@ def test_runs_are_whole_numbers():
     found = converter().convert({"t": [0.0, 0.0], "run": [0, 1], "x": [1.0, 2.0]})
     assert list(found.run) == [0, 1]
     for run in (0.5, -1, 3e9, float("nan")):
-        with pytest.raises(polyest.InvalidInput, match="run: row 1: .* must be a whole number from"):
+        said = r"run: row 1 \(counted from 0\): .* must be a whole number from"
+        with pytest.raises(polyest.InvalidInput, match=said):
             converter().convert({"t": [0.0, 0.1], "run": [0, run], "x": [1.0, 1.0]})
 
 
@@ -204,7 +205,7 @@ def test_dates_without_a_time_zone_are_in_none(monkeypatch):
 
 def test_a_date_that_is_missing_does_not_begin_the_time():
     one, dates = converter(), np.array(["NaT", "2026-01-31T13:00:05"], dtype="datetime64[ns]")
-    with pytest.raises(polyest.InvalidInput, match="t: row 0 has no time"):
+    with pytest.raises(polyest.InvalidInput, match=r"t: row 0 \(counted from 0\) has no time"):
         one.convert({"t": dates, "x": [1.0, 2.0]})
     assert list(one.convert({"t": dates[1:], "x": [2.0]}).time_s) == [0.0]
 
@@ -219,8 +220,8 @@ def test_time_differences_are_times():
     ({"x": [1.0]}, "t: no column of the time; the columns are 'x'"),
     ({"t": [0.0], "y": [1.0]}, r"no column of a measured output \(x\); the columns are 't', 'y'"),
     ({"t": [0.0, 1.0], "x": [1.0]}, "columns differ in length: t 2, x 1"),
-    ({"t": [0.0], "x": [np.inf]}, "x: row 0: inf is not finite"),
-    ({"t": [np.nan], "x": [1.0]}, "t: row 0 has no time"),
+    ({"t": [0.0], "x": [np.inf]}, r"x: row 0 \(counted from 0\): inf is not finite"),
+    ({"t": [np.nan], "x": [1.0]}, r"t: row 0 \(counted from 0\) has no time"),
     ({"t": [0.0], "x": ["fast"]}, "x: has values of type"),
     ({"t": [0.0], "x": [[1.0]]}, r"x: has the shape \(1, 1\)"),
     ([1.0, 2.0], "a list has no columns"),

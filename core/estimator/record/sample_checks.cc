@@ -35,6 +35,15 @@ absl::Status Refusal(const FieldPath& field, const absl::FormatSpec<Arguments...
                       absl::InvalidArgumentError(absl::StrFormat(format, arguments...)));
 }
 
+// Returns an error of a row, which the sentence begins with.
+template <class... Arguments>
+absl::Status RowRefusal(const FieldPath& field, size_t row,
+                        const absl::FormatSpec<Arguments...>& format,
+                        const Arguments&... arguments) {
+  return Refusal(field, "%s%s", RowInWords(static_cast<int64_t>(row)),
+                 absl::StrFormat(format, arguments...));
+}
+
 FieldPath ValueAt(const Samples& samples, const SampleColumn& column, size_t row) {
   return {"columns", &column - samples.columns.data(), "value", row};
 }
@@ -48,10 +57,10 @@ absl::Status CheckSize(const Samples& samples, const SampleColumn& column, size_
                        const NoiseModel& noise, double sigma) {
   const double z = column.value[row];
   if (noise.unknown || std::abs(z) <= kMaxSignalToNoise * sigma) return absl::OkStatus();
-  return Refusal(ValueAt(samples, column, row),
-                 "row %d, column %s: %g is more than %g times its noise of %g; check its unit "
-                 "or the noise",
-                 row, column.name, z, kMaxSignalToNoise, sigma);
+  return RowRefusal(ValueAt(samples, column, row), row,
+                    ", column %s: %g is more than %g times its noise of %g; check its unit "
+                    "or the noise",
+                    column.name, z, kMaxSignalToNoise, sigma);
 }
 
 }  // namespace
@@ -260,18 +269,17 @@ absl::Status SampleChecks::CheckTimes(const Samples& samples) const {
     const int run = samples.run.empty() ? 0 : samples.run[k];
     POLYEST_RETURN_IF_ERROR(CheckPlace(samples, k));
     if (before.rows == 0 ? run != 0 : run < before.run) {
-      return Refusal({"run", k},
-                     "row %d, column run: %d after %d; runs start at 0 and never decrease", k, run,
-                     before.run);
+      return RowRefusal({"run", k}, k,
+                        ", column run: %d after %d; runs start at 0 and never decrease", run,
+                        before.run);
     }
     if (before.run_ended && run == before.run) {
-      return Refusal({"run", k}, "row %d: run %d has ended; further rows belong to a new run", k,
-                     run);
+      return RowRefusal({"run", k}, k, ": run %d has ended; further rows belong to a new run", run);
     }
     if (before.rows > 0 && run == before.run && time_s <= before.time_s) {
-      return Refusal({"time_s", k},
-                     "row %d, column t: %.17g after %.17g; times must increase within a run", k,
-                     time_s, before.time_s);
+      return RowRefusal({"time_s", k}, k,
+                        ", column t: %.17g after %.17g; times must increase within a run", time_s,
+                        before.time_s);
     }
     before.run = run;
     before.run_ended = false;
@@ -285,24 +293,24 @@ absl::Status SampleChecks::CheckPlace(const Samples& samples, size_t row) const 
   const double time_s = samples.time_s[row];
   const int run = samples.run.empty() ? 0 : samples.run[row];
   if (run < 0) {
-    return Refusal({"run", row}, "row %d, column run: %d; runs start at 0 and never decrease", row,
-                   run);
+    return RowRefusal({"run", row}, row, ", column run: %d; runs start at 0 and never decrease",
+                      run);
   }
   if (run >= max_runs_) {
-    return Refusal(
-        {"run", row},
-        "row %d, column run: %d must be below %d: each run has parameters of its own, and more "
+    return RowRefusal(
+        {"run", row}, row,
+        ", column run: %d must be below %d: each run has parameters of its own, and more "
         "runs would have too many of them; they are eliminated only from an adaptive expansion "
         "of output errors and if the runs share a parameter",
-        row, run, max_runs_);
+        run, max_runs_);
   }
   if (!std::isfinite(time_s) || time_s < 0) {
-    return Refusal({"time_s", row}, "row %d, column t: %g must be a finite time ≥ 0", row, time_s);
+    return RowRefusal({"time_s", row}, row, ", column t: %g must be a finite time ≥ 0", time_s);
   }
   if ((time_s > 0 && time_s < kMinTimeS) || time_s > kMaxTimeS) {
-    return Refusal({"time_s", row},
-                   "row %d, column t: %g must be 0 or a time from %g to %g s; check its unit", row,
-                   time_s, kMinTimeS, kMaxTimeS);
+    return RowRefusal({"time_s", row}, row,
+                      ", column t: %g must be 0 or a time from %g to %g s; check its unit", time_s,
+                      kMinTimeS, kMaxTimeS);
   }
   return absl::OkStatus();
 }
@@ -311,9 +319,9 @@ absl::Status SampleChecks::CheckValues(const Samples& samples) const {
   for (const SampleColumn& column : samples.columns) {
     for (size_t k = 0; k < samples.rows(); ++k) {
       if (Missing(column, k) || std::abs(column.value[k]) <= kMaxOutput) continue;
-      return Refusal(ValueAt(samples, column, k),
-                     "row %d, column %s: %g must be a finite number, of at most 1e100 in magnitude",
-                     k, column.name, column.value[k]);
+      return RowRefusal(ValueAt(samples, column, k), k,
+                        ", column %s: %g must be a finite number, of at most 1e100 in magnitude",
+                        column.name, column.value[k]);
     }
   }
   return absl::OkStatus();

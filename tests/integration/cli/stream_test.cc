@@ -254,13 +254,13 @@ TEST_F(StreamTest, KeepsTheRowsBeforeOneThatTheDaemonRefusesAndSaysWhichItIs) {
                                             "20",        "--format", "jsonl"};
   const Finished run = Run(Command(File("bad.csv", bad), options));
   EXPECT_EQ(run.exit_status, 2);
-  EXPECT_THAT(run.err, HasSubstr("bad.csv: row 52, column x: 1e+90 is more than"));
+  EXPECT_THAT(run.err, HasSubstr("bad.csv:54: column x: 1e+90 is more than"));
   EXPECT_THAT(run.err, HasSubstr("; sessions/rig-1 has kept the 52 rows sent before\n"));
   EXPECT_EQ(LastEstimate(run.out).samples(), 52);
   // The rows that the session has already count as rows of the file, too.
   const Finished again = Run(Command(File("bad.csv", bad), options));
   EXPECT_EQ(again.exit_status, 2);
-  EXPECT_THAT(again.err, HasSubstr("bad.csv: row 52, column x: 1e+90 is more than"));
+  EXPECT_THAT(again.err, HasSubstr("bad.csv:54: column x: 1e+90 is more than"));
   const Finished second = Run(Command(File("good.csv", good), options));
   ASSERT_EQ(second.exit_status, 0) << second.err;
   ExpectSame(LastEstimate(second.out), EstimateOf(60));

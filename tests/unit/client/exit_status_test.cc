@@ -49,22 +49,5 @@ TEST(Report, NamesTheOptionInPlaceOfTheField) {
             "polyest: --quantiles: 2 must lie between 0 and 1\npolyest: fixed.q: unknown\n");
 }
 
-TEST(InFile, PutsTheFileInFrontOfTheField) {
-  EXPECT_EQ(InFile(InvalidField("fixed.q", "unknown"), "p.json", "d.csv").message(),
-            "p.json: fixed.q: unknown");
-  EXPECT_EQ(InFile(InvalidField("measurements.time[0]", "x"), "p.json", "d.csv"),
-            absl::InvalidArgumentError("d.csv: measurements.time[0]: x"));
-  EXPECT_EQ(InFile(InvalidField("regularizationMode", "x"), "p.json", "d.csv").message(),
-            "p.json: regularizationMode: x");
-  EXPECT_EQ(InFile(absl::UnavailableError("gone"), "p.json", "d.csv").message(), "gone");
-}
-
-TEST(InFile, NamesNoFileForAFieldThatIsInNone) {
-  for (const char* const field : {"probabilities[0]", "untilS", "regularizationModes", ""}) {
-    const absl::Status refused = InvalidField(field, "x");
-    EXPECT_EQ(InFile(refused, "p.json", "d.csv"), refused) << field;
-  }
-}
-
 }  // namespace
 }  // namespace polyest::internal

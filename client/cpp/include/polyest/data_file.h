@@ -83,6 +83,25 @@ struct DataColumns {
 // units are those of its model, which only the caller knows: they are left empty.
 DataColumns ColumnsOf(const v1::Problem& problem);
 
+// The lines of a file that its rows are on.
+class RowLines {
+ public:
+  // Adds the next row.
+  void Add(int64_t line);
+  // Returns the number of the line, from 1, of a row, from 0; 0 if there is no such row.
+  int64_t LineOf(int64_t row) const;
+
+ private:
+  // Rows on successive lines.
+  struct Piece {
+    int64_t first_row;
+    int64_t first_line;
+  };
+
+  std::vector<Piece> pieces_;
+  int64_t rows_ = 0;
+};
+
 // Receives the error of a refused line. If it returns OK, the line is left out and reading goes on;
 // otherwise reading ends with its status.
 using RefusedLine = absl::FunctionRef<absl::Status(absl::Status)>;
@@ -123,6 +142,9 @@ class DataReader {
   // and columns of the quantities' own names in the model's units only.
   std::string Found() const;
 
+  // Returns the lines of the rows read so far, for messages about a row.
+  const RowLines& Lines() const;
+
  private:
   class Reader;
   explicit DataReader(std::unique_ptr<Reader> reader);
@@ -130,9 +152,10 @@ class DataReader {
   std::unique_ptr<Reader> reader_;
 };
 
-// Reads a whole file. Writes Found() to `found` unless it is null.
+// Reads a whole file. Writes Found() to `found` and Lines() to `lines` unless they are null.
 absl::StatusOr<v1::Measurements> ReadDataFile(const std::string& path, const DataColumns& columns,
                                               RefusedLine refused = StopAtRefusedLine,
-                                              std::string* found = nullptr);
+                                              std::string* found = nullptr,
+                                              RowLines* lines = nullptr);
 
 }  // namespace polyest

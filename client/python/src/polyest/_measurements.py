@@ -12,7 +12,7 @@ from typing import Optional
 import numpy as np
 
 from polyest._proto.v1 import measurements_pb2, problem_pb2
-from polyest._table import Array, Clock, Data, Floats, Table, floats, refuse
+from polyest._table import Array, Clock, Data, Floats, Table, floats, refuse, row_text
 from polyest.io._choices import nearest
 from polyest.io._recording import Batch, Recording
 
@@ -150,8 +150,9 @@ class MeasurementConverter:
         wrong = np.flatnonzero(~((numbers == np.floor(numbers)) & (0 <= numbers)
                                  & (numbers <= _LAST_RUN)))
         if wrong.size:
-            raise refuse(header, f"row {wrong[0]}: {numbers[wrong[0]]:.15g} must be a whole number "
-                         f"from 0 to {_LAST_RUN}")
+            at = int(wrong[0])
+            raise refuse(header, f"{row_text(at)}: {numbers[at]:.15g} must be a whole number from "
+                         f"0 to {_LAST_RUN}")
         message.run.extend(int(number) for number in numbers)
         used.append(header)
 

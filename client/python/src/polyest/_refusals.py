@@ -14,7 +14,7 @@ Measurements = measurements_pb2.Measurements
 
 # The field of a row's time, run or value; and how a message begins that does not begin with it.
 _FIELD = re.compile(r"(measurements\.(?:timeS|run|channels\[\d+\]\.values)\[)(\d+)(\])")
-_TEXT = re.compile(r"^(row )(\d+)(, column )")
+_TEXT = re.compile(r"^(row )(\d+)( \(counted from 0\))")
 
 
 def refused_row(error: PolyestError) -> Optional[int]:

@@ -29,6 +29,11 @@ def refuse(field: str, rule: str) -> InvalidInput:
     return InvalidInput(f"{field}: {rule}", field=field, rule=rule)
 
 
+def row_text(row: int) -> str:
+    """Returns how messages name a row, as those of the daemon do."""
+    return f"row {row} (counted from 0)"
+
+
 class Table:
     """Columns by name, of equal length."""
 
@@ -128,7 +133,7 @@ def floats(name: str, values: Array) -> Floats:
     numbers: Floats = values.astype(np.float64)
     infinite = np.flatnonzero(np.isinf(numbers))
     if infinite.size:
-        raise refuse(name, f"row {infinite[0]}: {numbers[infinite[0]]} is not finite")
+        raise refuse(name, f"{row_text(int(infinite[0]))}: {numbers[infinite[0]]} is not finite")
     return numbers
 
 
@@ -160,4 +165,4 @@ class Clock:
 
 def _check_present(name: str, missing: npt.NDArray[np.bool_]) -> None:
     if missing.any():
-        raise refuse(name, f"row {np.argmax(missing)} has no time")
+        raise refuse(name, f"{row_text(int(np.argmax(missing)))} has no time")

@@ -247,7 +247,7 @@ TEST(Estimator, TakesRowsOfANewRunOnlyAfterTheEndOfARun) {
   ASSERT_TRUE(estimator->Append(first).ok());
   Samples more = Rows(record, 10, 10);
   EXPECT_EQ(estimator->Append(more).message(),
-            "row 0: run 0 has ended; further rows belong to a new run");
+            "row 0 (counted from 0): run 0 has ended; further rows belong to a new run");
   more.run.assign(10, 1);
   EXPECT_TRUE(estimator->Append(more).ok());
   ASSERT_TRUE(estimator->Process().ok());

@@ -44,7 +44,8 @@ TEST(EstimatorGuards, RefusesASampleThatWouldDrownTheOthersInRounding) {
   const auto estimator = MakeEstimator(problem);
   const absl::Status refused = estimator->Append(bad);
   EXPECT_EQ(refused.code(), absl::StatusCode::kInvalidArgument);
-  EXPECT_THAT(std::string(refused.message()), HasSubstr("row 1, column x: 1e+200"));
+  EXPECT_THAT(std::string(refused.message()),
+              HasSubstr("row 1 (counted from 0), column x: 1e+200"));
   EXPECT_EQ(estimator->rows_appended(), 0);
   EXPECT_TRUE(estimator->Append(good).ok());
 }

@@ -156,7 +156,8 @@ TEST(PerRun, ManyRunsRefuseWhatWouldBeTooManyParameters) {
   samples.columns = {{"y", {1, 1}, {}}};
   const absl::Status refused = estimator->Append(samples);
   EXPECT_EQ(refused.code(), absl::StatusCode::kInvalidArgument);
-  EXPECT_THAT(std::string(refused.message()), HasSubstr("row 1, column run: 11 must be below 11"));
+  EXPECT_THAT(std::string(refused.message()),
+              HasSubstr("row 1 (counted from 0), column run: 11 must be below 11"));
   EXPECT_EQ(estimator->rows_appended(), 0);
   samples.run = {0, 10};
   EXPECT_TRUE(estimator->Append(samples).ok());

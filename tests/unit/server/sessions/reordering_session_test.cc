@@ -209,15 +209,17 @@ TEST_F(ReorderingSessionTest, RefusesBadRowsWhenTheyArriveAndGoesOn) {
   AddAll(*session, {Steps({"x"}, 100, 120)});
   v1::Measurements huge = Steps({"v"}, 100, 120);
   huge.mutable_channels(0)->set_values(4, 1e30);
-  EXPECT_THAT(Add(*session, huge).message(), HasSubstr("row 4, column v: 1e+30 is more than"));
+  EXPECT_THAT(Add(*session, huge).message(),
+              HasSubstr("row 4 (counted from 0), column v: 1e+30 is more than"));
   v1::Measurements unknown = Steps({"v"}, 100, 120);
   unknown.mutable_channels(0)->set_name("w");
   EXPECT_THAT(Add(*session, unknown).message(), HasSubstr("column \"w\" is neither"));
   v1::Measurements negative = Steps({"v"}, 100, 120);
   negative.set_time_s(0, -0.5);
   EXPECT_THAT(Add(*session, negative).message(), HasSubstr("must be a finite time"));
-  EXPECT_THAT(Add(*session, Steps({"v"}, 60, 80)).message(),
-              HasSubstr("row 0, column v: t = 0.59999999999999998 s comes too late"));
+  EXPECT_THAT(
+      Add(*session, Steps({"v"}, 60, 80)).message(),
+      HasSubstr("row 0 (counted from 0), column v: t = 0.59999999999999998 s comes too late"));
   EXPECT_EQ(session->Describe().sample_count(), 20);
   AddAll(*session, {Steps({"v"}, 80, 120), Steps({"force"}, 90, 180)});
   AddAll(*session, {EndOfRun()});

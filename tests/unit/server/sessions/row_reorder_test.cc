@@ -173,18 +173,19 @@ TEST(RowReorder, RefusesWhatComesTooLateWithItsChannelItsRowAndTheTimes) {
   const absl::Status late = collector.reorder.Next(BatchOf({{"v", 0.8}, {"v", 0.625}})).status();
   EXPECT_EQ(late.code(), absl::StatusCode::kInvalidArgument);
   EXPECT_EQ(late.message(),
-            "row 1, column v: t = 0.625 s comes too late: the newest row is at 1 s, and the rows "
+            "row 1 (counted from 0), column v: t = 0.625 s comes too late: the newest row is at 1 "
+            "s, and the rows "
             "more than reorderWindowS = 0.25 s before it, up to 0.75 s, have been released to the "
             "estimator");
   // A row is late, too, if the row that makes it late is in the same batch: it does not matter how
   // rows are cut into batches.
   EXPECT_THAT(collector.reorder.Next(BatchOf({{"x", 2}, {"v", 1.5}})).status().message(),
-              HasSubstr("row 1, column v: t = 1.5 s comes too late"));
+              HasSubstr("row 1 (counted from 0), column v: t = 1.5 s comes too late"));
   collector.Take(BatchOf({}, /*end_of_run=*/true));
   EXPECT_THAT(collector.reorder.Next(BatchOf({{"v", 0.9}})).status().message(),
-              HasSubstr("row 0: run 0 has ended"));
+              HasSubstr("row 0 (counted from 0): run 0 has ended"));
   EXPECT_THAT(collector.reorder.Next(BatchOf({{"v", 0, 1}, {"v", 0.9, 0}})).status().message(),
-              HasSubstr("row 1, column run: 0 after 1"));
+              HasSubstr("row 1 (counted from 0), column run: 0 after 1"));
 }
 
 TEST(RowReorder, RefusesASecondSampleOfAChannelAtATime) {
@@ -192,9 +193,9 @@ TEST(RowReorder, RefusesASecondSampleOfAChannelAtATime) {
   collector.Take(BatchOf({{"x", 0.5}, {"v", 0.5}}));
   const std::string rule = "column x: there is another sample at t = 0.5 s of run 0";
   EXPECT_THAT(collector.reorder.Next(BatchOf({{"u", 0.5}, {"x", 0.5}})).status().message(),
-              HasSubstr("row 1, " + rule));
+              HasSubstr("row 1 (counted from 0), " + rule));
   EXPECT_THAT(Collector().reorder.Next(BatchOf({{"x", 0.5}, {"x", 0.5}})).status().message(),
-              HasSubstr("row 1, " + rule));
+              HasSubstr("row 1 (counted from 0), " + rule));
 }
 
 TEST(RowReorder, IsLeftAsItWasByABatchThatIsRefused) {

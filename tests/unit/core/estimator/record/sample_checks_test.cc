@@ -183,7 +183,7 @@ TEST_F(SampleChecksTest, RefuseTimesThatAreNone) {
   for (const double time_s : {-0.5, kNan, std::numeric_limits<double>::infinity()}) {
     Samples samples = ThreeRows();
     samples.time_s[1] = time_s;
-    EXPECT_THAT(Refusal(samples), ::testing::StartsWith("row 1, column t: "));
+    EXPECT_THAT(Refusal(samples), ::testing::StartsWith("row 1 (counted from 0), column t: "));
     EXPECT_THAT(Refusal(samples), HasSubstr("must be a finite time ≥ 0"));
   }
 }
@@ -207,7 +207,7 @@ TEST_F(SampleChecksTest, RefuseTimesThatDoNotIncrease) {
   for (const double time_s : {1.0, 0.5}) {
     Samples samples = ThreeRows();
     samples.time_s[2] = time_s;
-    EXPECT_THAT(Refusal(samples), HasSubstr("row 2, column t: "));
+    EXPECT_THAT(Refusal(samples), HasSubstr("row 2 (counted from 0), column t: "));
     EXPECT_THAT(Refusal(samples), HasSubstr("after 1; times must increase within a run"));
   }
 }
@@ -216,7 +216,8 @@ TEST_F(SampleChecksTest, RefuseTimesThatGoBackFromBatchToBatch) {
   Take(ThreeRows());
   Samples next = ThreeRows();
   next.time_s = {2, 3, 4};
-  EXPECT_EQ(Refusal(next), "row 0, column t: 2 after 2; times must increase within a run");
+  EXPECT_EQ(Refusal(next),
+            "row 0 (counted from 0), column t: 2 after 2; times must increase within a run");
   next.time_s = {2.5, 3, 4};
   EXPECT_TRUE(checks_.Check(next).ok());
 }
@@ -225,7 +226,7 @@ TEST_F(SampleChecksTest, RefuseARecordThatDoesNotBeginWithRunZero) {
   for (const int run : {1, -1}) {
     Samples samples = ThreeRows();
     samples.run = {run, run, run};
-    EXPECT_THAT(Refusal(samples), HasSubstr("row 0, column run: "));
+    EXPECT_THAT(Refusal(samples), HasSubstr("row 0 (counted from 0), column run: "));
     EXPECT_THAT(Refusal(samples), HasSubstr("runs start at 0 and never decrease"));
   }
 }
@@ -233,13 +234,15 @@ TEST_F(SampleChecksTest, RefuseARecordThatDoesNotBeginWithRunZero) {
 TEST_F(SampleChecksTest, RefuseRunsThatDecrease) {
   Samples samples = ThreeRows();
   samples.run = {0, 1, 0};
-  EXPECT_EQ(Refusal(samples), "row 2, column run: 0 after 1; runs start at 0 and never decrease");
+  EXPECT_EQ(Refusal(samples),
+            "row 2 (counted from 0), column run: 0 after 1; runs start at 0 and never decrease");
   samples.run = {0, 1, 1};
   samples.time_s = {0, 1, 2};
   Take(samples);
   Samples next = ThreeRows();
   next.time_s = {3, 4, 5};  // The rows belong to run 0 if none is given.
-  EXPECT_EQ(Refusal(next), "row 0, column run: 0 after 1; runs start at 0 and never decrease");
+  EXPECT_EQ(Refusal(next),
+            "row 0 (counted from 0), column run: 0 after 1; runs start at 0 and never decrease");
 }
 
 TEST_F(SampleChecksTest, TakeAnyColumnMissingInAnyRow) {
@@ -259,14 +262,17 @@ TEST_F(SampleChecksTest, RefuseValuesThatAreNoNumbers) {
   Samples samples = ThreeRows();
   samples.columns[0].value[1] = kNan;
   EXPECT_EQ(Refusal(samples),
-            "row 1, column x: nan must be a finite number, of at most 1e100 in magnitude");
+            "row 1 (counted from 0), column x: nan must be a finite number, of at most 1e100 in "
+            "magnitude");
   samples = ThreeRows();
   samples.columns[1].value[0] = -std::numeric_limits<double>::infinity();
   EXPECT_EQ(Refusal(samples),
-            "row 0, column force: -inf must be a finite number, of at most 1e100 in magnitude");
+            "row 0 (counted from 0), column force: -inf must be a finite number, of at most 1e100 "
+            "in magnitude");
   samples.columns[1].value[0] = -2e100;  // its square would soon be infinite
   EXPECT_EQ(Refusal(samples),
-            "row 0, column force: -2e+100 must be a finite number, of at most 1e100 in magnitude");
+            "row 0 (counted from 0), column force: -2e+100 must be a finite number, of at most "
+            "1e100 in magnitude");
 }
 
 }  // namespace
