@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "core/common/status.h"
+#include "core/external/clean_text.h"
 
 namespace polyest::internal {
 namespace {
@@ -47,7 +48,7 @@ absl::Status ForEachPiece(zip_t* archive, uint64_t index, const std::string& nam
 absl::Status CheckName(const std::string& name) {
   const auto refuse = [&name](const char* rule) {
     return absl::FailedPreconditionError(
-        absl::StrFormat("the archive's entry \"%s\" %s", name.substr(0, kLongestName), rule));
+        absl::StrFormat("the archive's entry \"%s\" %s", CleanText(name, kLongestName), rule));
   };
   if (name.empty() || name.size() > kLongestName) return refuse("must have 1 to 1024 characters");
   if (name.front() == '/') return refuse("must not be an absolute path");

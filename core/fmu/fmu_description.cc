@@ -43,7 +43,7 @@ absl::Status ReadKind(const pugi::xml_node& root, FmuInterface& interface) {
   interface.identifier = element.attribute("modelIdentifier").value();
   if (!IsIdentifier(interface.identifier)) {
     return WrongDescription(absl::StrFormat("modelIdentifier \"%s\" must be a C identifier",
-                                            interface.identifier.substr(0, 64)));
+                                            CleanText(interface.identifier, 64)));
   }
   if (element.attribute("needsExecutionTool").as_bool()) {
     return WrongDescription("the FMU needs the tool that it was made with, which is not supported");

@@ -104,7 +104,7 @@ absl::Status VariableList::AddCommon(const pugi::xml_node& node, const pugi::xml
         !std::isfinite(quantity.default_value)) {
       return WrongDescription(
           absl::StrFormat("the start value \"%s\" of %s must be a finite number",
-                          std::string(start.value()).substr(0, 64), quantity.name));
+                          CleanText(start.value(), 64), quantity.name));
     }
   }
   variables_.push_back(std::move(variable));
