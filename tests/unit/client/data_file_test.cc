@@ -115,6 +115,22 @@ TEST(DataReader, KeepsTheRowsBeforeARefusedLine) {
   EXPECT_THAT(batch.channels(0).values(), ElementsAre(1, 2));
 }
 
+TEST(DataReader, KnowsTheLinesOfItsRows) {
+  std::istringstream in("rig 3\n# t in s\nt,x\ns,m\n0,1\n1,2\n\n# a pause\n2,3\n2,4\n3,4\n");
+  auto reader = DataReader::Open(in, "data.csv", kMeasuredOnly);
+  ASSERT_TRUE(reader.ok()) << reader.status();
+  EXPECT_EQ(reader->Lines().LineOf(0), 0);
+  const auto leave_out = [](const absl::Status&) { return absl::OkStatus(); };
+  while (reader->Read(1, leave_out)->time_s_size() > 0) continue;
+  const RowLines& lines = reader->Lines();
+  EXPECT_EQ(lines.LineOf(-1), 0);
+  EXPECT_EQ(lines.LineOf(0), 5);
+  EXPECT_EQ(lines.LineOf(1), 6);
+  EXPECT_EQ(lines.LineOf(2), 9);
+  EXPECT_EQ(lines.LineOf(3), 11);
+  EXPECT_EQ(lines.LineOf(4), 0);
+}
+
 TEST(DataReader, MayBeginWithALaterRun) {
   DataColumns columns = kMeasuredOnly;
   columns.options.any_first_run = true;
