@@ -37,7 +37,7 @@ TEST(ModelComparisonTest, OnlyFiltersHaveAHorizon) {
   TableBackend backend = Backend();
   v1::Experiment pushed = Oscillator(), drifting = Oscillator(), stated = Oscillator();
   pushed.mutable_problem()->add_process_noise()->set_state("v");
-  drifting.mutable_problem()->mutable_uncertain(0)->mutable_drift();
+  drifting.mutable_problem()->mutable_uncertain(0)->mutable_drift()->mutable_random_walk();
   stated.mutable_problem()->set_likelihood(v1::Problem::PREDICTION_ERROR);
   std::vector<double> horizons_s;
   for (const v1::Experiment& experiment : {Oscillator(), pushed, drifting, stated}) {
