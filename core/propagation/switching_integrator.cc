@@ -45,12 +45,16 @@ SwitchingIntegrator::SwitchingIntegrator(const SwitchingModel* model,
 void SwitchingIntegrator::Begin(double span_s, double stop_s) {
   constexpr double kDifference = 1e-6;
   span_s_ = span_s;
-  if (restart_ || row_of(0).end_s == last_stop_s_) smooth_from_s_ = row_of(0).end_s;
+  const bool at_break = restart_ || row_of(0).end_s == last_stop_s_;
+  if (at_break) smooth_from_s_ = row_of(0).end_s;
   last_stop_s_ = stop_s;
   const double smooth_s = span_s > 0 || stop_s == kInfinity ? span_s : stop_s - row_of(0).end_s;
   switched_.SetSmoothSpan(smooth_from_s_, stop_s, kDifference * smooth_s);
   longest_s_ = model_->changes_at_rest() ? span_s : kInfinity;
-  if (begun_ && !restart_) return;
+  if (begun_ && !restart_) {
+    if (at_break) RenewFloors();
+    return;
+  }
   for (Eigen::Index row = 0; row < rows(); ++row) {
     const double end_s = row_of(row).end_s;
     switched_.ArgumentErrors(row, end_s, end_, relative_tolerance_, scale_.weights(), tolerance_);
@@ -61,23 +65,27 @@ void SwitchingIntegrator::Begin(double span_s, double stop_s) {
   }
   step_modes_ = switched_.modes();
   if (span_s == 0) return;
-  SetFloors(span_s);
+  SetFloors();
   begun_ = true;
   restart_ = false;
 }
 
 // Tells the error scale to what size a state at rest may grow within the span. Where forces cancel
-// along a surface, those on its lower side tell it.
-void SwitchingIntegrator::SetFloors(double span_s) {
+// along a surface, those on its lower side tell it. At the beginning of the span a force may just
+// begin to rise, as at that of a bump; at its end it is there.
+void SwitchingIntegrator::SetFloors() {
   Vector expected = Vector::Zero(end_.cols());
   for (Eigen::Index pass = 0; pass <= end_.cols(); ++pass) {
     const Vector before = expected;
     const Eigen::ArrayXXd moved = end_.rowwise() + before.transpose().array();
     for (Eigen::Index row = 0; row < rows(); ++row) {
-      RatesBelow(row, moved);
-      for (Eigen::Index s = 0; s < end_.cols(); ++s) {
-        const double size = span_s * std::abs(below_(row, s));
-        if (before(s) == 0 && std::isfinite(size)) expected(s) = std::max(expected(s), size);
+      const double begin_s = row_of(row).end_s;
+      for (const double time_s : {begin_s, std::min(begin_s + span_s_, last_stop_s_)}) {
+        RatesBelow(row, time_s, moved);
+        for (Eigen::Index s = 0; s < end_.cols(); ++s) {
+          const double size = span_s_ * std::abs(below_(row, s));
+          if (before(s) == 0 && std::isfinite(size)) expected(s) = std::max(expected(s), size);
+        }
       }
     }
     if (expected == before) break;
@@ -85,13 +93,19 @@ void SwitchingIntegrator::SetFloors(double span_s) {
   scale_.SetFloors(expected, expected);
 }
 
+// Sets the floors again where a state that rested when they were set may begin to move.
+void SwitchingIntegrator::RenewFloors() {
+  if (span_s_ > 0 && scale_.NeedsFloors()) SetFloors();
+}
+
 // Writes the row's rates at these states with the lower mode of every switch that slides.
-void SwitchingIntegrator::RatesBelow(Eigen::Index row, const Eigen::ArrayXXd& states) {
+void SwitchingIntegrator::RatesBelow(Eigen::Index row, double time_s,
+                                     const Eigen::ArrayXXd& states) {
   const SwitchedRows::Modes modes = switched_.modes();
   for (Eigen::Index i = 0; i < switched_.switches(); ++i) {
     switched_.Decode(row, i, modes.values(row, 1 + i));
   }
-  switched_.RatesOfRow(row, row_of(row).end_s, states, below_);
+  switched_.RatesOfRow(row, time_s, states, below_);
   for (Eigen::Index i = 0; i < switched_.switches(); ++i) {
     switched_.Decode(row, i, switched_.Encoded(modes, row, i));
   }

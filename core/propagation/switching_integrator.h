@@ -52,8 +52,9 @@ class SwitchingIntegrator final : public BlockIntegrator {
   void Accept(Eigen::Index row, double length_s, bool hits_stop);
   void Switch(Eigen::Index row);
   bool LeaveAtEdge(Eigen::Index row);
-  void SetFloors(double span_s);
-  void RatesBelow(Eigen::Index row, const Eigen::ArrayXXd& states);
+  void SetFloors();
+  void RenewFloors();
+  void RatesBelow(Eigen::Index row, double time_s, const Eigen::ArrayXXd& states);
   void FirstStep(Eigen::Index row, double span_s);
   void NoteStiffness(Eigen::Index row, double length_s);
   void WriteStates(double time_s, Block states);

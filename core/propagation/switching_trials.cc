@@ -60,12 +60,14 @@ void SwitchingIntegrator::JudgeFull(Eigen::Index row) {
   looks_.Undo(row);
   at.full_s = length_s;
   at.trial_s = crossing.theta * length_s;
+  at.next_s = std::min(length_s, length_s * factor);
+  switched_.ArgumentErrors(row, at.end_s, end_, relative_tolerance_, scale_.weights(), tolerance_);
+  // A row that leaves at once has rested at the surface. In a step of the time's own resolution the
+  // way that it goes could not be told from rounding errors.
+  if (at.trial_s <= Resolution(at)) return Switch(row);
   // What comes after the switching may be as short as what came before.
   constexpr double kMaxGrowth = 32;
-  at.next_s =
-      std::min({length_s, length_s * factor, std::max(kMaxGrowth * at.trial_s, Resolution(at))});
-  switched_.ArgumentErrors(row, at.end_s, end_, relative_tolerance_, scale_.weights(), tolerance_);
-  if (at.trial_s <= Resolution(at) / 16) return Switch(row);
+  at.next_s = std::min(at.next_s, std::max(kMaxGrowth * at.trial_s, Resolution(at)));
   at.locating = true;
   at.secants = 0;
   at.slope = crossing.slope / length_s;
@@ -151,6 +153,7 @@ void SwitchingIntegrator::Switch(Eigen::Index row) {
   switched_.Project(row, at.end_s, scale_.weights(), end_, at.which);
   switched_.RatesOfRow(row, at.end_s, end_, first_rates_);
   looks_.Begin(row, at.end_s, end_);
+  RenewFloors();
 }
 
 // Counts the steps that stability limits: h |λ| ≈ h |f(x_7) − f(x_6)| ÷ |x_7 − x_6|, where x_6 and

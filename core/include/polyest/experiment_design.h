@@ -8,10 +8,8 @@
 // the prior's, and the information gained is ½ log₂ det M bits: one bit halves the standard
 // deviation in one direction. Expected values are means over draws of the truth from the prior
 // (K. Chaloner and I. Verdinelli, "Bayesian experimental design: a review", Statist. Sci. 10,
-// 1995). Slopes are those of the expansion over the prior. Where it differs from the model, its
-// slopes do, too, and at one ξ the difference is not independent from sample to sample: N times its
-// residual variance counts as noise, so that all N samples together tell no more than one that is
-// off by as much. An inaccurate expansion thus promises too little, not too much.
+// 1995). Slopes are those of the expansion over the prior, and its residual variance counts as
+// noise: an inaccurate expansion promises too little, not too much.
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>

@@ -169,16 +169,36 @@ TEST(Switching, EmptiesATankWhoseOutflowEndsAtZero) {
                });
 }
 
-// At rest on the surface until t = 1, the argument then leaves it as (t − 1)⁴, upwards or
+// At rest on the surface until t = 1, the argument then leaves it as (t − 1)³, upwards or
 // downwards.
 TEST(Switching, LeavesASurfaceAtWhichItRested) {
-  ExpectMotion(
-      {.states = {{"a", "s*max(t - 1, 0)"}, {"b", "a"}, {"c", "b"}, {"y", "if(c > 0, 3*c, 2*c)"}},
-       .outputs = {{"y", "y"}}},
-      "s", {-30, -7, -1, -0.3, -0.01, 0.01, 0.7, 1, 3, 11}, 3, 0.25, 30 * kAccumulated,
-      [](double t, double s) {
-        return (s > 0 ? 3 : 2) * s * std::pow(std::max(t - 1, 0.0), 5) / 120;
-      });
+  ExpectMotion({.states = {{"a", "s*max(t - 1, 0)"}, {"b", "a"}, {"y", "if(b > 0, 3*b, 2*b)"}},
+                .outputs = {{"y", "y"}}},
+               "s", {-30, -7, -1, -0.3, -0.01, 0.01, 0.7, 1, 3, 11}, 3, 0.25, 30 * kAccumulated,
+               [](double t, double s) {
+                 return (s > 0 ? 3 : 2) * s * std::pow(std::max(t - 1, 0.0), 4) / 24;
+               });
+}
+
+// A car at rest comes to a bump, whose slope jumps at its beginning. With the same coefficient on
+// both sides its damper is linear, and the oracle is the linear model.
+TEST(Switching, LeavesTheRestOfACarBeforeABump) {
+  const auto travel = [](const std::string& damper) {
+    const std::string strut = "(ks*(zs - zu) + " + damper + ")";
+    EquationSpecification car;
+    car.states = {{"zs", "vs"},
+                  {"vs", "-" + strut + "/300"},
+                  {"zu", "vu"},
+                  {"vu", "(" + strut + " + 190000*(road - zu))/40"}};
+    car.intermediates = {{"rate", "vs - vu"}, {"road", "0.05*max(min(t - 1, 1.2 - t), 0)"}};
+    car.outputs = {{"travel", "zs - zu"}};
+    car.parameters = {{"c", 1500}};
+    return Propagated(car, "ks", Evenly(12'000, 24'000, 8), TimesUntil(2, 0.05));
+  };
+  const Matrix switching = travel("if(rate > 0, c*rate, c*rate)"), linear = travel("c*rate");
+  EXPECT_LE((switching - linear).cwiseAbs().maxCoeff(),
+            kAccumulated * linear.cwiseAbs().maxCoeff());
+  EXPECT_GT(linear.cwiseAbs().maxCoeff(), 1e-3);
 }
 
 // The half swings of ẍ = −sign x − 0.3 sign ẋ shorten by √(7/13) each, so that there are infinitely
