@@ -200,10 +200,12 @@ Vector NearestInside(const Prior& prior, const Vector& xi) {
 Vector MiddleInside(const Prior& prior, const Region& region) {
   Vector middle = NearestInside(prior, region.centre());
   const Vector reach = region.axes().cwiseAbs().rowwise().sum();
+  const Vector first = region.centre() - reach, last = region.centre() + reach;
   for (Eigen::Index j = 0; j < middle.size(); ++j) {
-    const double low = std::max(prior.lower()[j], region.centre()[j] - reach[j]);
-    const double high = std::min(prior.upper()[j], region.centre()[j] + reach[j]);
-    if (low < high) middle[j] = 0.5 * (low + high);
+    const double low = std::max(prior.lower()[j], first[j]);
+    const double high = std::min(prior.upper()[j], last[j]);
+    const bool is_cut = low > first[j] || high < last[j];
+    if (is_cut && low < high) middle[j] = 0.5 * (low + high);
   }
   return middle;
 }

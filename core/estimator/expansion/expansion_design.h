@@ -86,9 +86,9 @@ void SpreadCheckPoints(const ResolvedProblem& problem, const Vector& inside,
 
 // Returns the point of Ω that is nearest to ξ, germ by germ, and a little off its bounds.
 Vector NearestInside(const Prior& prior, const Vector& xi);
-// Returns the middle of what the region and Ω have in common, germ by germ. Points of the region
-// that are moved inside stay apart when they are moved towards it; towards a point at a bound they
-// would fall together.
+// Returns the region's centre or, in germs in which Ω cuts the region, the middle of what they have
+// in common. Points of the region that are moved inside stay apart when they are moved towards it;
+// towards a point at a bound they would fall together.
 Vector MiddleInside(const Prior& prior, const Region& region);
 
 // Returns the box along the particles' principal axes that contains them, widened by a margin of

@@ -118,6 +118,7 @@ LearnedNoise Elimination::NoiseAbout(const Vector& centre) const {
 
 absl::Status Elimination::Expand(const RunPath& path, const SampleStore& store, const RunRows& rows,
                                  int threads, const Stop& stop) {
+  POLYEST_RETURN_IF_ERROR(CheckFinite(path, rows.run));
   path_ = path;
   const Region region = JointRegion(path);
   const Vector centre = NearestInside(problem_.prior(), region.centre());
@@ -129,8 +130,7 @@ absl::Status Elimination::Expand(const RunPath& path, const SampleStore& store, 
   run_ = rows.run;
   RowBlock block;
   for (int64_t first = rows.first; first < rows.end; first += kRowsAtOnce) {
-    const int64_t count = std::min(kRowsAtOnce, rows.end - first);
-    POLYEST_RETURN_IF_ERROR(store.Read(first, count, block));
+    POLYEST_RETURN_IF_ERROR(store.Read(first, std::min(kRowsAtOnce, rows.end - first), block));
     POLYEST_RETURN_IF_ERROR(expansion_->Propagate(block, stop));
     if (expansion_->fitted_rows() < block.count()) return expansion_->shortage();
     for (int row = 0; row < block.count(); ++row) expansion_->Absorb(row);

@@ -1,5 +1,7 @@
 #include "core/estimator/expansion/run_path.h"
 
+#include <absl/strings/str_format.h>
+
 #include <algorithm>
 #include <memory>
 #include <utility>
@@ -67,6 +69,16 @@ RunPath PathIn(const ResolvedProblem& problem, int run, const GermSummary& poste
   path.spread = SpreadOf(covariance(own, own) - path.slope * both.transpose(),
                          problem.prior().GermStandardDeviation()(own));
   return path;
+}
+
+absl::Status CheckFinite(const RunPath& path, int run) {
+  if (path.centre.allFinite() && path.slope.allFinite() && path.spread.allFinite()) {
+    return absl::OkStatus();
+  }
+  return absl::FailedPreconditionError(absl::StrFormat(
+      "the own parameters of run %d cannot be integrated out: the posterior of what is shared is "
+      "degenerate",
+      run));
 }
 
 }  // namespace polyest::internal

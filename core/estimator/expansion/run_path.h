@@ -2,6 +2,8 @@
 
 // Where the parameters of runs are before and after a run is eliminated (run_elimination.h).
 
+#include <absl/status/status.h>
+
 #include "core/estimator/problem/ended_runs.h"
 #include "core/estimator/problem/resolved_problem.h"
 #include "core/estimator/record/learned_noise.h"
@@ -30,5 +32,9 @@ void FreeOfPopulation(const ResolvedProblem& problem, Matrix& slope);
 // shared ones.
 RunPath PathIn(const ResolvedProblem& problem, int run, const GermSummary& posterior,
                const Vector& centre);
+
+// Returns FailedPrecondition for a path that is not finite, as where the posterior of what is
+// shared has no width.
+absl::Status CheckFinite(const RunPath& path, int run);
 
 }  // namespace polyest::internal
