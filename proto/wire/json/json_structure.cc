@@ -32,6 +32,9 @@ class Scan {
         TakeString(c);
       } else if (IsOfWord(c)) {
         TakeWord();
+        if (text_ == "null" && !open_.empty() && !open_.back().is_object) {
+          return Error(Path() + ": must be a value, not null");
+        }
       } else {
         ++at_;
         if (auto error = TakeSign(c)) return error;

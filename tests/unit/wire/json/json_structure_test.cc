@@ -55,6 +55,12 @@ TEST(JsonStructure, NamesNoFieldAtGreatLength) {
   EXPECT_EQ(ErrorOf("{\"\xff\n\": 1, \"\xff\n\": 1}"), "3: \\xff\\n: given twice");
 }
 
+TEST(JsonStructure, FindsANullInAList) {
+  EXPECT_EQ(ErrorOf(R"({"a": null, "b": ["null", {"c": null}]})"), "");
+  EXPECT_EQ(ErrorOf(R"({"channels": [{"values": [0.96, null, 0.57]}]})"),
+            "1: channels[0].values[1]: must be a value, not null");
+}
+
 TEST(JsonStructure, LeavesOtherErrorsToTheParser) {
   for (const char* const json :
        {"", "]", "}}", "{]", "\"", "\"\\", "{\"a", "{:", "[:]", "nonsense"}) {
