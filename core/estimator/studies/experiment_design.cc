@@ -20,8 +20,8 @@ namespace polyest::internal {
 namespace {
 
 constexpr int kDraws = 64;  // number of draws of the true value
-// Root mean square of the residual over that of the noise of a mean of all samples, above which an
-// expansion is reported as inaccurate.
+// Root mean square of the residual, in units of the noise, above which an expansion is reported as
+// inaccurate.
 constexpr double kInaccurateResidual = 0.5;
 
 // An output that is, or could be, measured.
@@ -148,7 +148,6 @@ class Outlook {
   // Adds a_k = L ∂y_k/∂ξ /√R_k at the draw.
   void AddDraw(int draw, const Basis& basis, const std::vector<NoiseModel>& noises,
                const ExpandedRecord& record) {
-    const auto samples = static_cast<double>(record.residual_variance.size() / m_);
     Vector phi(basis.size());
     Matrix gradient(basis.size(), basis.dimension());
     basis.EvaluateWithGradient(draws_.xi(draw), phi, gradient);
@@ -166,8 +165,8 @@ class Outlook {
       largest[i] = std::max(largest[i], std::abs(y[row]));
       const double sigma = noises[static_cast<size_t>(i)].StandardDeviation(y[row], largest[i]);
       noise_variance_[i] += sigma * sigma;
-      // R = σ² + N ρ
-      const double variance = sigma * sigma + samples * record.residual_variance[row];
+      // R = σ² + residual variance
+      const double variance = sigma * sigma + record.residual_variance[row];
       if (variance > 0) {
         slopes.row(row) /= std::sqrt(variance);
       } else {
@@ -246,7 +245,7 @@ void Diagnose(const PriorExpansion& expansion, const ExpandedRecord& record, con
     const double residual =
         record.residual_variance(Eigen::seq(i, record.residual_variance.size() - 1, m)).mean();
     const double ratio = std::sqrt(residual / outlook.NoiseVariance(i));
-    if (ratio * std::sqrt(static_cast<double>(outlook.times())) <= kInaccurateResidual) continue;
+    if (ratio <= kInaccurateResidual) continue;
     inaccurate.push_back(
         absl::StrFormat("%s by %.2g", design.outputs[static_cast<size_t>(i)].output, ratio));
   }
@@ -254,9 +253,9 @@ void Diagnose(const PriorExpansion& expansion, const ExpandedRecord& record, con
     design.diagnostics.push_back(
         {DiagnosticCode::kExpansionInaccurate,
          absl::StrFormat("the expansion differs from the model, in units of the noise: %s; this "
-                         "counts as noise that all samples share, so that they tell more than said "
-                         "here, above all late ones; a higher order or narrower priors bring it "
-                         "down",
+                         "counts as noise, so that samples tell more than said here as a rule, but "
+                         "less of parameters that the model cannot tell apart; a higher order, a "
+                         "shorter time or narrower priors bring it down",
                          absl::StrJoin(inaccurate, ", "))});
   }
   if (!expansion.failures().empty()) {

@@ -9,7 +9,8 @@
 // deviation in one direction. Expected values are means over draws of the truth from the prior
 // (K. Chaloner and I. Verdinelli, "Bayesian experimental design: a review", Statist. Sci. 10,
 // 1995). Slopes are those of the expansion over the prior, and its residual variance counts as
-// noise: an inaccurate expansion promises too little, not too much.
+// noise. An inaccurate expansion thus promises too little as a rule, but too much of parameters
+// that the model cannot tell apart, where its own slopes do: kExpansionInaccurate warns of both.
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>

@@ -65,6 +65,24 @@ TEST_F(ExplainTest, NamesTheRatioThatFreeVibrationTells) {
                     HasSubstr("No other output of the model would identify m in this experiment")));
 }
 
+// Over the whole prior the expansion does not follow 50 s of oscillation, and would tell k and m
+// apart.
+TEST_F(ExplainTest, ConcludesNothingFromAnExpansionThatDoesNotFollowTheModel) {
+  const std::string problem = File("problem.json", R"({
+    "model": {"builtin": "mass_spring_damper"},
+    "fixed": {"x0": 1},
+    "uncertain": [{"name": "k", "uniform": {"lower": 31.584, "upper": 47.376}},
+                  {"name": "c", "uniform": {"lower": 0.1, "upper": 0.3}},
+                  {"name": "m", "uniform": {"lower": 0.8, "upper": 1.2}}],
+    "measured": [{"output": "x", "noise": {"absolute": 0.01}}]
+  })");
+  const Finished run =
+      Run({"explain", problem, POLYEST_SOURCE_DIR "/client/examples/oscillator.csv"});
+  ASSERT_EQ(run.exit_status, 0) << run.err;
+  EXPECT_THAT(run.out, AllOf(HasSubstr("k/m is known to "), Not(HasSubstr("should identify")),
+                             HasSubstr("the expansion cannot tell what would identify m")));
+}
+
 TEST_F(ExplainTest, NamesTheOutputToAdd) {
   EXPECT_THAT(Explain(R"({
     "model": {"builtin": "linear_two_state"},

@@ -244,7 +244,7 @@ TEST(ExperimentDesign, RefusalNamesFieldValueAndRule) {
   EXPECT_THAT(refusal([](auto& o) {
                 o.possible = {{"v", {.absolute = -1}}};
               }),
-              HasSubstr("possible[0].noise: -1"));
+              HasSubstr("possible[0].noise.absolute: -1"));
   EXPECT_THAT(refusal([](auto& o) { o.step_s = 1e-6; }), HasSubstr("limit"));
 }
 
