@@ -56,11 +56,19 @@ std::string DiagnosticText(v1::Diagnostic::Code code) {
   }
 }
 
+// Returns the most probable value with its standard deviation. Where the data say less than the
+// prior, that may be any value that the prior allows, and it is the posterior's mean with its own.
+std::string EstimateText(const v1::ParameterEstimate& p) {
+  const bool by_mean = p.verdict() == v1::Identifiability::NOT_IDENTIFIED;
+  return by_mean && p.posterior_std_dev() > 0 ? FormatUncertain(p.mean(), p.posterior_std_dev())
+                                              : FormatUncertain(p.map(), p.std_dev());
+}
+
 void PrintParameters(const v1::Estimate& estimate, std::ostream& out) {
   TextTable table(
       {"parameter", "estimate ± sd", "unit", "95 % interval", "prior", "sd/prior", "verdict"});
   for (const v1::ParameterEstimate& p : estimate.parameters()) {
-    table.AddRow({p.name(), FormatUncertain(p.map(), p.std_dev()), UnitText(p.unit()),
+    table.AddRow({p.name(), EstimateText(p), UnitText(p.unit()),
                   FormatInterval(p.lower95(), p.upper95(), p.std_dev()),
                   FormatUncertain(p.prior_mean(), p.prior_std_dev()),
                   FormatNumber(p.contraction(), 2),
@@ -277,8 +285,7 @@ std::string EstimateLine(const v1::Estimate& estimate) {
   std::string line = absl::StrFormat("t = %.6g s", estimate.time());
   for (const v1::ParameterEstimate& p : estimate.parameters()) {
     const std::string unit = UnitText(p.unit());
-    absl::StrAppend(&line, "  ", p.name(), " = ", FormatUncertain(p.map(), p.std_dev()),
-                    unit.empty() ? "" : " ", unit);
+    absl::StrAppend(&line, "  ", p.name(), " = ", EstimateText(p), unit.empty() ? "" : " ", unit);
   }
   return line;
 }
