@@ -1,5 +1,7 @@
 #include "core/estimator/posterior/assessment.h"
 
+#include <absl/strings/str_cat.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -82,6 +84,7 @@ class Assessment {
     findings_.degrees = DegreesOfFreedom(request_, estimate_.channels, fitted_);
     DescribeWindows(cost, eta);
     DescribeParameters(cost, eta);
+    POLYEST_RETURN_IF_ERROR(CheckFinite());
     DescribeBias(cost, eta, stop);
     POLYEST_RETURN_IF_ERROR(stop.Check());
     DescribeFilters();
@@ -341,6 +344,17 @@ class Assessment {
       factors[i] = std::min(factors[i] * std::max(1.0, curved), std::max(1.0, most));
     }
     Widen(factors, prior_, posterior_);
+  }
+
+  absl::Status CheckFinite() const {
+    for (const ParameterEstimate& p : estimate_.parameters) {
+      const Vector numbers{
+          {p.map, p.std_dev, p.mean, p.posterior_std_dev, p.lower95, p.upper95, p.contraction}};
+      if (numbers.allFinite()) continue;
+      return absl::FailedPreconditionError(absl::StrCat(
+          "the estimate of ", p.name, " is not finite: the posterior has gone far from the prior"));
+    }
+    return absl::OkStatus();
   }
 
   // Returns the ratio of posterior to prior standard deviation of the scores that is due to the

@@ -13,7 +13,7 @@
 namespace polyest::internal {
 
 // Returns the draws if their effective number is at least `effective_size` with `points` points or
-// up to four times as many, else nothing; nothing in more than three dimensions.
+// up to twice as many, else nothing; nothing in more than three dimensions.
 std::optional<WeightedDraws> DrawFromCover(const Cost& cost, const ExpansionDesign& design,
                                            int points, double effective_size);
 

@@ -22,11 +22,6 @@ absl::Status ValidateCorrelation(const FieldPath& noise_field, const NoiseModel&
     return InvalidField(field("time_constant_s"),
                         absl::StrFormat("%g must be a finite time > 0", noise.time_constant_s));
   }
-  if (noise.time_constant_s > 0 && noise.correlation != NoiseCorrelation::kKnown) {
-    return InvalidField(
-        field("time_constant_s"),
-        absl::StrFormat("%g has no effect unless the correlation is known", noise.time_constant_s));
-  }
   if (!(noise.white_share >= 0 && noise.white_share < 1)) {
     return InvalidField(field("white_share"),
                         absl::StrFormat("%g must be at least 0 and below 1", noise.white_share));
@@ -36,6 +31,11 @@ absl::Status ValidateCorrelation(const FieldPath& noise_field, const NoiseModel&
                         absl::StrFormat("%g has no effect without timeConstantS, over which the "
                                         "rest of the noise is correlated",
                                         noise.white_share));
+  }
+  if (noise.time_constant_s > 0 && noise.correlation != NoiseCorrelation::kKnown) {
+    return InvalidField(
+        field("time_constant_s"),
+        absl::StrFormat("%g has no effect unless the correlation is known", noise.time_constant_s));
   }
   return absl::OkStatus();
 }

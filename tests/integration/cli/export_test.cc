@@ -89,9 +89,10 @@ TEST_F(ExportTest, SaysInOneLineWhatIsWrong) {
            Case{{"import", File("short", whole.substr(0, whole.size() - 4)), "--session", "b"},
                 2,
                 "without an end (incomplete file)"},
-           Case{{"import", File("flipped", flipped(whole, whole.size() / 2)), "--session", "b"},
-                2,
-                "is damaged: its checksum is not that of its bytes"},
+           Case{
+               {"import", File("flipped", flipped(whole, whole.find('\n') + 20)), "--session", "b"},
+               2,
+               "is damaged: its checksum is not that of its bytes"},
        }) {
     const Finished run = OfDaemon(one.arguments);
     EXPECT_EQ(run.exit_status, one.exit_status) << one.words;

@@ -296,7 +296,7 @@ TEST(MappedParameter, RefusesWhatIsNoLognormal) {
   };
   EXPECT_THAT(refusal(0, 1), HasSubstr("lognormal.mean: 0 must be > 0"));
   EXPECT_THAT(refusal(-3, 1), HasSubstr("mean: -3 must be > 0"));
-  EXPECT_THAT(refusal(kNan, 1), HasSubstr("mean nan"));
+  EXPECT_THAT(refusal(kNan, 1), HasSubstr("mean: nan"));
   EXPECT_THAT(refusal(1, kInfinity), HasSubstr("std_dev: inf must lie between"));
   EXPECT_THAT(refusal(2, 201), HasSubstr("std_dev: 201 must be at most 100 times the mean 2"));
 }
@@ -308,7 +308,7 @@ TEST(MappedParameter, RefusesWhatIsNoTruncatedNormal) {
   EXPECT_THAT(refusal(0, 1, 2, 2), HasSubstr("truncated_normal: lower 2 must be below upper 2"));
   EXPECT_THAT(refusal(0, 1, kNan, 2), HasSubstr("lower nan must be below"));
   EXPECT_THAT(refusal(0, 0, -1, 2), HasSubstr("std_dev: 0 must be > 0"));
-  EXPECT_THAT(refusal(kInfinity, 1, -1, 2), HasSubstr("mean inf"));
+  EXPECT_THAT(refusal(kInfinity, 1, -1, 2), HasSubstr("mean: inf"));
   EXPECT_THAT(refusal(0, 1, 6, kInfinity),
               HasSubstr("only 9.86588e-10 of the normal's probability lies between lower 6 and "
                         "upper inf; it must be at least 1e-06"));

@@ -92,20 +92,20 @@ TEST(UncertainParameter, RefusalNamesParameterValueAndRule) {
   EXPECT_THAT(Refusal(UncertainParameter::Uniform("k", 5, 3)),
               HasSubstr("uniform: lower 5 must be below upper 3"));
   EXPECT_THAT(Refusal(UncertainParameter::Uniform("k", 3, 3)), HasSubstr("must be below"));
-  EXPECT_THAT(Refusal(UncertainParameter::Uniform("k", -kInfinity, 3)), HasSubstr("lower -inf"));
-  EXPECT_THAT(Refusal(UncertainParameter::Uniform("k", 0, kNan)), HasSubstr("upper nan"));
-  EXPECT_THAT(Refusal(UncertainParameter::Normal("c", kNan, 1)), HasSubstr("mean nan"));
+  EXPECT_THAT(Refusal(UncertainParameter::Uniform("k", -kInfinity, 3)), HasSubstr("lower: -inf"));
+  EXPECT_THAT(Refusal(UncertainParameter::Uniform("k", 0, kNan)), HasSubstr("upper: nan"));
+  EXPECT_THAT(Refusal(UncertainParameter::Normal("c", kNan, 1)), HasSubstr("mean: nan"));
   EXPECT_THAT(Refusal(UncertainParameter::Normal("c", 0, -1)),
               HasSubstr("normal.std_dev: -1 must be > 0"));
   EXPECT_THAT(Refusal(UncertainParameter::Normal("c", 0, kNan)), HasSubstr("must be > 0"));
   EXPECT_THAT(Refusal(UncertainParameter::Normal("c", 0, 1e200)), HasSubstr("must lie between"));
   EXPECT_THAT(Refusal(UncertainParameter::Beta("v", 0.5, 2, 0, 1)),
               HasSubstr("beta.alpha: 0.5 must lie between 1 and"));
-  EXPECT_THAT(Refusal(UncertainParameter::Beta("v", 2, kNan, 0, 1)), HasSubstr("beta nan"));
-  EXPECT_THAT(Refusal(UncertainParameter::Gamma("g", 0.9, 1, 0)), HasSubstr("shape 0.9"));
+  EXPECT_THAT(Refusal(UncertainParameter::Beta("v", 2, kNan, 0, 1)), HasSubstr("beta: nan"));
+  EXPECT_THAT(Refusal(UncertainParameter::Gamma("g", 0.9, 1, 0)), HasSubstr("shape: 0.9"));
   EXPECT_THAT(Refusal(UncertainParameter::Gamma("g", 2, 0, 0)),
               HasSubstr("gamma.scale: 0 must be > 0"));
-  EXPECT_THAT(Refusal(UncertainParameter::Gamma("g", 2, 1, kNan)), HasSubstr("shift nan"));
+  EXPECT_THAT(Refusal(UncertainParameter::Gamma("g", 2, 1, kNan)), HasSubstr("shift: nan"));
   EXPECT_THAT(Refusal(UncertainParameter::Normal("", 0, 1)), HasSubstr("name"));
 }
 

@@ -243,9 +243,9 @@ TEST(ToProblem, NamesThePlaceOfABadPrior) {
               StartsWith("uncertain[1].normal.stdDev: "));
   EXPECT_THAT(MessageWith(R"({"uncertain": [{"name": "v0", "beta": {"alpha": 0.5, "beta": 2,
                                              "lower": 0, "upper": 1}}]})"),
-              StartsWith("uncertain[0].beta: alpha 0.5"));
+              StartsWith("uncertain[0].beta.alpha: 0.5"));
   EXPECT_THAT(MessageWith(R"({"uncertain": [{"name": "v0", "gamma": {"shape": 0, "scale": 1}}]})"),
-              StartsWith("uncertain[0].gamma: shape 0"));
+              StartsWith("uncertain[0].gamma.shape: 0"));
   EXPECT_EQ(
       MessageWith(R"({"uncertain": [{"name": "v0", "lognormal": {"mean": -1, "stdDev": 1}}]})"),
       "uncertain[0].lognormal.mean: -1 must be > 0");
