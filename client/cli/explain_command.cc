@@ -224,8 +224,9 @@ absl::Status Explain(const ExplainArguments& arguments, std::ostream& out) {
   }
   backend.reset();  // erases its progress line
   PrintExplanation(input.estimate, open, design, out);
-  if (arguments.no_remedies || !CallsForRemedies(input.problem, input.estimate))
+  if (arguments.no_remedies || !CallsForRemedies(input.problem, input.estimate)) {
     return absl::OkStatus();
+  }
   if (HasFixedValueConflict(input.estimate)) {
     out << '\n';
     PrintSentence(

@@ -62,12 +62,18 @@ DataColumns ColumnsOf(const v1::Problem& problem) {
 }
 
 void RowLines::Add(int64_t line) {
-  if (line != LineOf(rows_ - 1) + 1 || rows_ == 0) pieces_.push_back({rows_, line});
+  if (rows_ == 0 || line != LineOf(rows_ - 1) + 1) {
+    constexpr size_t kMaxPieces = 65'536;
+    if (pieces_.size() == kMaxPieces) {
+      pieces_.erase(pieces_.begin(), pieces_.begin() + kMaxPieces / 2);
+    }
+    pieces_.push_back({rows_, line});
+  }
   ++rows_;
 }
 
 int64_t RowLines::LineOf(int64_t row) const {
-  if (row < 0 || row >= rows_) return 0;
+  if (row < 0 || row >= rows_ || row < pieces_.front().first_row) return 0;
   const auto after = std::ranges::upper_bound(pieces_, row, {}, &Piece::first_row);
   const Piece& piece = *std::prev(after);
   return piece.first_line + row - piece.first_row;

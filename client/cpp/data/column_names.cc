@@ -35,13 +35,16 @@ bool PartBrackets(absl::string_view header, char open, char close, ColumnName& c
   return !column.name.empty();
 }
 
-bool PartSlash(absl::string_view header, ColumnName& column) {
-  constexpr absl::string_view kSlash = " / ";
-  const size_t slash = header.rfind(kSlash);
-  if (slash == absl::string_view::npos) return false;
-  column.unit = std::string(StripCell(header.substr(slash + kSlash.size())));
-  column.name = std::string(StripCell(header.substr(0, slash)));
-  return !column.name.empty();
+// Parts "name / unit" and "name/unit", as standards write axes and tables, and "name in unit".
+bool PartSeparator(absl::string_view header, ColumnName& column) {
+  for (const absl::string_view separator : {" / ", "/", " in "}) {
+    const size_t at = header.find(separator);
+    if (at == absl::string_view::npos) continue;
+    column.unit = std::string(StripCell(header.substr(at + separator.size())));
+    column.name = std::string(StripCell(header.substr(0, at)));
+    if (!column.name.empty() && CheckRecordedUnit(column.unit).ok()) return true;
+  }
+  return false;
 }
 
 bool PartTimeEnding(absl::string_view header, ColumnName& column) {
@@ -63,7 +66,7 @@ ColumnName ParseColumnName(absl::string_view header) {
   const absl::string_view whole = column.header;
   if (PartBrackets(whole, '[', ']', column)) return column;
   if (PartBrackets(whole, '(', ')', column) && CheckRecordedUnit(column.unit).ok()) return column;
-  if (PartSlash(whole, column) && CheckRecordedUnit(column.unit).ok()) return column;
+  if (PartSeparator(whole, column)) return column;
   if (PartTimeEnding(whole, column)) return column;
   column.name = column.header;
   column.unit.clear();

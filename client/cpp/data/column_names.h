@@ -17,8 +17,8 @@ struct ColumnName {
   std::string unit;    // empty: the header has none
 };
 
-// Parts a header cell. A unit is in square brackets at its end; in parentheses or after " / " if it
-// can be read as one. The unit of a time may also be an ending: "t_ms", "time_s".
+// Parts a header cell. A unit is in square brackets at its end; in parentheses, after "/" or after
+// " in " if it can be read as one. The unit of a time may also be an ending: "t_ms", "time_s".
 ColumnName ParseColumnName(absl::string_view header);
 
 // Returns the text of a cell in a row of units without its brackets.

@@ -334,6 +334,16 @@ TEST(DataReader, GoesOnAfterABadLineIfAsked) {
   EXPECT_THAT(sieved.data->channels(1).missing(), ElementsAre(0, 1));
 }
 
+TEST(RowLines, ForgetTheOldestWhereALineIsBetweenRows) {
+  RowLines lines;
+  constexpr int64_t kRows = 200'000;
+  for (int64_t row = 0; row < kRows; ++row) lines.Add(2 * row + 2);
+  EXPECT_EQ(lines.LineOf(0), 0);
+  EXPECT_EQ(lines.LineOf(kRows - 1), 2 * kRows);
+  EXPECT_EQ(lines.LineOf(kRows - 30'000), 2 * (kRows - 30'000) + 2);
+  EXPECT_EQ(lines.LineOf(kRows), 0);
+}
+
 TEST(DataReader, SaysOfTheRowsAfterAClockWentBackFromWhereItDid) {
   const Sieved sieved =
       Sieve("t,x,v,run\n0,1,1,0\n5,1,1,0\n1,1,1,0\n2,1,1,0\n6,1,1,0\n5.5,1,1,0\n");

@@ -83,12 +83,14 @@ struct DataColumns {
 // units are those of its model, which only the caller knows: they are left empty.
 DataColumns ColumnsOf(const v1::Problem& problem);
 
-// The lines of a file that its rows are on.
+// The lines of a file that its rows are on. In an endless pipe with a line between its rows those
+// of the oldest rows are forgotten.
 class RowLines {
  public:
   // Adds the next row.
   void Add(int64_t line);
-  // Returns the number of the line, from 1, of a row, from 0; 0 if there is no such row.
+  // Returns the number of the line, from 1, of a row, from 0; 0 if there is no such row or its line
+  // has been forgotten.
   int64_t LineOf(int64_t row) const;
 
  private:
