@@ -1,7 +1,5 @@
 #include "core/estimator/posterior/assessment.h"
 
-#include <absl/strings/str_cat.h>
-
 #include <algorithm>
 #include <cmath>
 
@@ -70,13 +68,7 @@ class Assessment {
     findings_.conflict = FindPriorConflict(problem_, posterior_, regularization_);
     findings_.shift =
         std::hypot(findings_.shift, findings_.integration_shift, findings_.population_shift);
-    fitted_ = FittedParameters(design_.region.HessianToGerm(cost.MismatchHessian(eta)), prior_);
-    spent_ = fitted_ + 2;
-    information_ = design_.region.HessianToGerm(cost.InformationHessian(eta, spent_));
-    if (!information_.allFinite()) {
-      return absl::FailedPreconditionError(
-          "the curvature of the cost at its minimum is not finite");
-    }
+    POLYEST_RETURN_IF_ERROR(FindInformation(cost, eta));
     // The noise is judged by the draws before they are widened: farther out, the residuals are
     // those of the expansion.
     estimate_.channels = DescribeChannels(request_, cost, eta, posterior_, fitted_);
@@ -84,7 +76,7 @@ class Assessment {
     findings_.degrees = DegreesOfFreedom(request_, estimate_.channels, fitted_);
     DescribeWindows(cost, eta);
     DescribeParameters(cost, eta);
-    POLYEST_RETURN_IF_ERROR(CheckFinite());
+    POLYEST_RETURN_IF_ERROR(CheckFinite(estimate_.parameters));
     DescribeBias(cost, eta, stop);
     POLYEST_RETURN_IF_ERROR(stop.Check());
     DescribeFilters();
@@ -195,6 +187,15 @@ class Assessment {
     if (correction.degree == 0) return;
     findings_.shift = std::min(findings_.shift, correction.shift + findings_.carried_shift);
     Reweigh(correction.log_factors, posterior_);
+  }
+
+  // Sets what the data tell at the minimum, and how many parameters they fit.
+  absl::Status FindInformation(const Cost& cost, const Vector& eta) {
+    fitted_ = FittedParameters(design_.region.HessianToGerm(cost.MismatchHessian(eta)), prior_);
+    spent_ = fitted_ + 2;
+    information_ = design_.region.HessianToGerm(cost.InformationHessian(eta, spent_));
+    if (information_.allFinite()) return absl::OkStatus();
+    return absl::FailedPreconditionError("the curvature of the cost at its minimum is not finite");
   }
 
   void DescribeParameters(const Cost& cost, const Vector& eta) {
@@ -344,17 +345,6 @@ class Assessment {
       factors[i] = std::min(factors[i] * std::max(1.0, curved), std::max(1.0, most));
     }
     Widen(factors, prior_, posterior_);
-  }
-
-  absl::Status CheckFinite() const {
-    for (const ParameterEstimate& p : estimate_.parameters) {
-      const Vector numbers{
-          {p.map, p.std_dev, p.mean, p.posterior_std_dev, p.lower95, p.upper95, p.contraction}};
-      if (numbers.allFinite()) continue;
-      return absl::FailedPreconditionError(absl::StrCat(
-          "the estimate of ", p.name, " is not finite: the posterior has gone far from the prior"));
-    }
-    return absl::OkStatus();
   }
 
   // Returns the ratio of posterior to prior standard deviation of the scores that is due to the

@@ -1,5 +1,7 @@
 #include "core/estimator/posterior/marginal_description.h"
 
+#include <absl/strings/str_cat.h>
+
 #include "core/bayes/weighted_samples.h"
 
 namespace polyest::internal {
@@ -32,6 +34,17 @@ void GoByPriorIfInaccurate(const Findings& findings, const Prior& prior, int i,
   parameter.upper95 = marginal.ToParameter(germ.Quantile(0.975));
   parameter.contraction = 1;
   parameter.verdict = Verdict::kNotIdentified;
+}
+
+absl::Status CheckFinite(const std::vector<ParameterEstimate>& parameters) {
+  for (const ParameterEstimate& p : parameters) {
+    const Vector numbers{
+        {p.map, p.std_dev, p.mean, p.posterior_std_dev, p.lower95, p.upper95, p.contraction}};
+    if (numbers.allFinite()) continue;
+    return absl::FailedPreconditionError(absl::StrCat(
+        "the estimate of ", p.name, " is not finite: the posterior has gone far from the prior"));
+  }
+  return absl::OkStatus();
 }
 
 }  // namespace polyest::internal

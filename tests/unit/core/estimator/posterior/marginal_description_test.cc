@@ -1,8 +1,10 @@
 #include "core/estimator/posterior/marginal_description.h"
 
+#include <absl/strings/match.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <vector>
 
 #include "core/estimator/problem/logarithmic_germs.h"
 
@@ -59,6 +61,25 @@ TEST(MarginalDescription, IsThatOfTheDrawsWhereTheDataAreUsed) {
   GoByPriorIfInaccurate(WithPower(0.5), prior, 1, k);
   EXPECT_EQ(k.mean, k.prior_mean);
   EXPECT_EQ(k.map, 25);
+}
+
+TEST(MarginalDescription, IsRefusedIfItIsNotFinite) {
+  const Prior prior = Mixed();
+  const std::vector<ParameterEstimate> finite = {Narrow(prior, 0), Narrow(prior, 1)};
+  EXPECT_TRUE(CheckFinite(finite).ok());
+  for (double ParameterEstimate::*number :
+       {&ParameterEstimate::map, &ParameterEstimate::std_dev, &ParameterEstimate::mean,
+        &ParameterEstimate::posterior_std_dev, &ParameterEstimate::lower95,
+        &ParameterEstimate::upper95, &ParameterEstimate::contraction}) {
+    for (const double value : {std::nan(""), kInfinity}) {
+      std::vector<ParameterEstimate> parameters = finite;
+      parameters[1].name = "k";
+      parameters[1].*number = value;
+      const absl::Status status = CheckFinite(parameters);
+      EXPECT_TRUE(absl::IsFailedPrecondition(status));
+      EXPECT_TRUE(absl::StartsWith(status.message(), "the estimate of k is not finite")) << status;
+    }
+  }
 }
 
 // Chains that have not mixed may be as wrong as an expansion that the model contradicts.
