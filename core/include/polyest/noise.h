@@ -43,10 +43,10 @@ struct NoiseModel {
   double relative_to_max = 0;  // ≥ 0, of max |z| or of the full scale
   bool unknown = false;        // whether a factor of σ is estimated from the samples
   NoiseCorrelation correlation = NoiseCorrelation::kWhite;  // in time
-  double time_constant_s = 0;                               // τ > 0 when the correlation is known
-  OutlierHandling outliers = OutlierHandling::kNone;        // what is done about gross errors
-  double full_scale = 0;  // ≥ 0, in the output's unit; 0: not known
-  double least = 0;       // ≥ 0, the least σ, in the output's unit
+  double time_constant_s = 0;  // τ > 0 when the correlation is known, else 0
+  OutlierHandling outliers = OutlierHandling::kNone;  // what is done about gross errors
+  double full_scale = 0;                              // ≥ 0, in the output's unit; 0: not known
+  double least = 0;                                   // ≥ 0, the least σ, in the output's unit
   // f, 0 ≤ f < 1: the share of the variance that is white when the correlation is known. A sensor's
   // noise on top of a model's slow error has both parts.
   double white_share = 0;
