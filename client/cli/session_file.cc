@@ -73,12 +73,7 @@ absl::Status SessionFileWriter::Write(const v1::SessionRecord& record) {
   return draft_->Write(bytes + encoded);
 }
 
-absl::Status SessionFileWriter::Finish() {
-  std::string end;
-  AppendNumber(0, end);
-  POLYEST_RETURN_IF_ERROR(draft_->Write(end));
-  return draft_->Replace();
-}
+absl::Status SessionFileWriter::Finish() { return draft_->Replace(); }
 
 absl::StatusOr<std::unique_ptr<SessionFileReader>> SessionFileReader::Open(
     const std::string& file) {
@@ -95,20 +90,26 @@ absl::StatusOr<std::unique_ptr<SessionFileReader>> SessionFileReader::Open(
   return reader;
 }
 
+absl::Status SessionFileReader::Error(const std::string& what) const {
+  return absl::InvalidArgumentError(absl::StrFormat("%s: record %d %s", file_, record_, what));
+}
+
 absl::StatusOr<std::optional<v1::SessionRecord>> SessionFileReader::Read() {
+  if (ended_) return std::nullopt;
   ++record_;
   const std::optional<uint32_t> length = ReadNumber(in_);
-  if (length == uint32_t{0}) return std::nullopt;
   const std::optional<uint32_t> checksum = ReadNumber(in_);
   const std::string encoded = length ? ReadBytes(in_, *length) : "";
   if (!length || !checksum || encoded.size() < *length) {
-    return absl::InvalidArgumentError(
-        absl::StrFormat("%s: ends in record %d, without an end (incomplete file)", file_, record_));
+    return Error("is cut off or missing: the file is incomplete");
   }
   v1::SessionRecord record;
   if (ChecksumOf(encoded) != *checksum || !record.ParseFromString(encoded)) {
-    return absl::InvalidArgumentError(absl::StrFormat(
-        "%s: record %d is damaged: its checksum is not that of its bytes", file_, record_));
+    return Error("is damaged: its checksum is not that of its bytes");
+  }
+  ended_ = record.has_end();
+  if (ended_ && in_.peek() != std::ifstream::traits_type::eof()) {
+    return Error("is the end, but more follows: the file is damaged");
   }
   return record;
 }

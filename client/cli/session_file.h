@@ -2,8 +2,7 @@
 
 // Writes and reads session files, for `polyest export` and `polyest import`. A file has a first
 // line that identifies its kind and then polyest.v1.SessionRecord messages, each after its length
-// and its CRC-32, and after the last one a length of 0. These numbers are of four bytes, the lowest
-// first.
+// and its CRC-32, which are numbers of four bytes, the lowest first. The last message is the end.
 
 #include <absl/status/statusor.h>
 
@@ -25,7 +24,7 @@ class SessionFileWriter {
   static absl::StatusOr<std::unique_ptr<SessionFileWriter>> Open(const std::string& file);
   // Appends the record. Fails as Open.
   absl::Status Write(const v1::SessionRecord& record);
-  // Ends the draft, replaces the file by it, and returns when that is on the disk. Fails as Open.
+  // Replaces the file by the draft and returns when that is on the disk. Fails as Open.
   absl::Status Finish();
 
  private:
@@ -39,16 +38,18 @@ class SessionFileReader {
   // Opens a file. INVALID_ARGUMENT if it cannot be read or is not a session file.
   static absl::StatusOr<std::unique_ptr<SessionFileReader>> Open(const std::string& file);
 
-  // Returns the next record; none after the last. INVALID_ARGUMENT names a record that is damaged
-  // or in which the file ends.
+  // Returns the next record; none after the end. INVALID_ARGUMENT names a record that is damaged or
+  // missing, and says if more follows the end.
   absl::StatusOr<std::optional<v1::SessionRecord>> Read();
 
  private:
   explicit SessionFileReader(const std::string& file) : file_(file), in_(file, std::ios::binary) {}
+  absl::Status Error(const std::string& what) const;
 
   const std::string file_;
   std::ifstream in_;
   int64_t record_ = 0;  // the number of the record read last, from 1
+  bool ended_ = false;
 };
 
 }  // namespace polyest::internal

@@ -17,15 +17,17 @@ absl::StatusOr<int64_t> Export(const ExportArguments& arguments) {
   request.set_name(absl::StrCat("sessions/", arguments.session));
   std::unique_ptr<SessionFileWriter> writer;
   int64_t batches = 0;
+  bool ended = false;
   const auto write = [&](const v1::SessionRecord& record) -> absl::Status {
     if (record.has_batch()) batches = record.batch().sequence();
+    ended = record.has_end();
     if (writer == nullptr) {
       POLYEST_ASSIGN_OR_RETURN(writer, SessionFileWriter::Open(arguments.file));
     }
     return writer->Write(record);
   };
   POLYEST_RETURN_IF_ERROR(client.ExportSession(request, write));
-  if (writer == nullptr) return absl::DataLossError("the daemon gave no records");
+  if (!ended) return absl::DataLossError("the daemon's records have no end");
   POLYEST_RETURN_IF_ERROR(writer->Finish());
   return batches;
 }

@@ -63,7 +63,10 @@ absl::StatusOr<std::vector<v1::SessionRecord>> SessionExport::Next() {
       });
   if (!read.ok() && read != full) return read;
   const bool complete = given_ == described_.last_sequence();
-  if (complete && !std::exchange(ended_, true)) POLYEST_RETURN_IF_ERROR(AddHistory(records));
+  if (complete && !std::exchange(ended_, true)) {
+    POLYEST_RETURN_IF_ERROR(AddHistory(records));
+    records.emplace_back().mutable_end();
+  }
   return records;
 }
 

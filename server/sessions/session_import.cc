@@ -34,6 +34,7 @@ SessionImport::~SessionImport() {
 }
 
 absl::Status SessionImport::Take(const v1::ImportSessionRequest& request, const Stop& stop) {
+  if (ended_) return InvalidField("record", "must not follow the end");
   switch (request.record().record_case()) {
     case v1::SessionRecord::kHead:
       return Begin(request.session_id(), request.record().head(), stop);
@@ -41,10 +42,12 @@ absl::Status SessionImport::Take(const v1::ImportSessionRequest& request, const 
       return Append(request.record().batch());
     case v1::SessionRecord::kPastEstimate:
       return Remember(request.record().past_estimate());
+    case v1::SessionRecord::kEnd:
+      return TakeEnd();
     case v1::SessionRecord::RECORD_NOT_SET:
       break;
   }
-  return InvalidField("record", "must be a head, a batch or a past estimate");
+  return InvalidField("record", "must be a head, a batch, a past estimate or the end");
 }
 
 absl::Status SessionImport::Begin(const std::string& id, const v1::SessionRecord::Head& head,
@@ -164,11 +167,20 @@ absl::Status SessionImport::Remember(const v1::SessionRecord::PastEstimate& past
   return absl::OkStatus();
 }
 
-absl::StatusOr<std::shared_ptr<Session>> SessionImport::Finish() {
+absl::Status SessionImport::TakeEnd() {
   const int64_t batches = loaded_ == nullptr ? 0 : loaded_->intake().place().sequence;
   if (loaded_ == nullptr || batches < promised_) {
     return InvalidField("record", absl::StrFormat("the session breaks off after batch %d of %d",
                                                   batches, promised_));
+  }
+  ended_ = true;
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::shared_ptr<Session>> SessionImport::Finish() {
+  if (!ended_) {
+    POLYEST_RETURN_IF_ERROR(TakeEnd());
+    return InvalidField("record", "the session breaks off before its end");
   }
   // All ordinals are multiples of the stride with which they were kept, whatever it was.
   for (JournalHistoryPoint& point : history_) {

@@ -21,13 +21,13 @@ class SessionImport {
   SessionImport(const SessionImport&) = delete;
   SessionImport& operator=(const SessionImport&) = delete;
 
-  // Takes the head, then batch after batch, then the history; waits for the journal.
+  // Takes the head, then batch after batch, the history and the end; waits for the journal.
   // INVALID_ARGUMENT for a record that does not follow the one before, RESOURCE_EXHAUSTED while
   // memory is short; other errors are those of SessionRegistry::Create and of a batch that is
   // streamed; on a stop request its status. Must not be called again after an error.
   absl::Status Take(const v1::ImportSessionRequest& request, const Stop& stop = {});
-  // Makes the session visible and returns it. INVALID_ARGUMENT when the head, or batches that it
-  // promises, are missing; ALREADY_EXISTS when the name has been taken meanwhile, and
+  // Makes the session visible and returns it. INVALID_ARGUMENT when the head, batches that it
+  // promises, or the end are missing; ALREADY_EXISTS when the name has been taken meanwhile, and
   // RESOURCE_EXHAUSTED when the last place has been.
   absl::StatusOr<std::shared_ptr<Session>> Finish();
   // Returns the number of the session's rows that are in memory: some thousands at most, because
@@ -42,12 +42,15 @@ class SessionImport {
   absl::Status Store(const v1::Problem& problem, const Stop& stop);
   absl::Status Append(const v1::SessionRecord::Batch& batch);
   absl::Status Remember(const v1::SessionRecord::PastEstimate& past);
+  // INVALID_ARGUMENT if records are missing.
+  absl::Status TakeEnd();
 
   SessionRegistry& registry_;
   SessionHead head_;
   int64_t promised_ = 0;  // number of batches that the head promises
   std::unique_ptr<LoadedSession> loaded_;
   std::vector<JournalHistoryPoint> history_;
+  bool ended_ = false;  // whether the record of the end has come
 };
 
 }  // namespace polyest::internal

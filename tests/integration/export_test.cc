@@ -97,6 +97,8 @@ TEST_F(ExportTest, KeepsNothingOfAnImportThatIsNoGood) {
     std::vector<v1::SessionRecord> records;
     std::string message;
   };
+  std::vector<v1::SessionRecord> twice_ended = records;
+  twice_ended.push_back(records.back());
   v1::SessionRecord bad = records[2];
   bad.mutable_batch()->mutable_measurements()->set_time_s(0, 0);
   for (const Case& one : {
@@ -109,9 +111,13 @@ TEST_F(ExportTest, KeepsNothingOfAnImportThatIsNoGood) {
                 {records[0], records[1], records[2], records[3], records[3]},
                 "3 must be 4, and the head promises 3 batches"},
            Case{"a bad batch", {records[0], records[1], bad}, "times must increase"},
+           Case{"no end", {records.begin(), records.end() - 1}, "breaks off before its end"},
+           Case{"an early end", {records[0], records[1], records.back()}, "after batch 1 of 3"},
+           Case{"nothing but the end", {records.back()}, "after batch 0 of 0"},
+           Case{"more after the end", twice_ended, "must not follow the end"},
            Case{"an empty record",
                 {v1::SessionRecord()},
-                "must be a head, a batch or a past estimate"},
+                "must be a head, a batch, a past estimate or the end"},
        }) {
     const grpc::Status status = Import("copy", one.records);
     EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT) << one.what;
@@ -123,7 +129,7 @@ TEST_F(ExportTest, KeepsNothingOfAnImportThatIsNoGood) {
 
 TEST_F(ExportTest, BringsTheHistoryAlong) {
   const auto records = Exported();
-  ASSERT_GE(records.size(), 6u);  // the head, three batches, two past estimates
+  ASSERT_GE(records.size(), 7u);  // the head, three batches, two past estimates, the end
   ASSERT_TRUE(Import("copy", records).ok());
   const v1::EstimateHistory was = History("sessions/rig"), is = History("sessions/copy");
   ASSERT_GE(is.points_size(), 2);
@@ -139,7 +145,7 @@ TEST_F(ExportTest, BringsTheHistoryAlong) {
 
 TEST_F(ExportTest, RefusesAHistoryThatIsNone) {
   auto records = Exported();
-  ASSERT_GE(records.size(), 6u);
+  ASSERT_GE(records.size(), 7u);
   const auto refusal = [&](const std::function<void(v1::SessionRecord::PastEstimate&)>& change) {
     std::vector<v1::SessionRecord> changed = records;
     change(*changed[5].mutable_past_estimate());

@@ -291,16 +291,20 @@ def test_a_damaged_session_file_is_refused(client, problem, rows, tmp_path):
         session.append(rows(0, 200))
         session.export(file)
     whole = file.read_bytes()
-    for cut in (1, 4, 7, len(whole) // 2):
+    for cut in (1, 4, 9, 10, len(whole) // 2):  # the last record, the end, is of ten bytes
         file.write_bytes(whole[:-cut])
-        with pytest.raises(polyest.InvalidInput, match="ends in record .*, without an end"):
+        with pytest.raises(polyest.InvalidInput, match="is cut off or missing"):
             client.import_session(file, "cut-off")
+    file.write_bytes(whole + b"\0")
+    with pytest.raises(polyest.InvalidInput, match="is the end, but more follows"):
+        client.import_session(file, "longer")
     beginning = whole.index(b"\n") + 9
     for at in (beginning, len(whole) // 2, len(whole) - 20):
         file.write_bytes(whole[:at] + bytes([whole[at] ^ 1]) + whole[at + 1:])
         with pytest.raises(polyest.InvalidInput, match="is damaged"):
             client.import_session(file, "flipped")
-    assert "damaged" in {one.name for one in client.sessions()}
+    names = {one.name for one in client.sessions()}
+    assert "damaged" in names and not {"cut-off", "longer", "flipped"} & names
 
 
 def test_an_exported_file_is_on_the_disk_before_it_has_its_name(

@@ -134,7 +134,12 @@ TEST_F(SecurityTest, RefusesADaemonThatItsCaDoesNotKnow) {
 
 TEST_F(SecurityTest, SaysInEveryKindOfCallThatTheDaemonMayServeTlsOnly) {
   DaemonProcess daemon(WithTls());
-  const std::string session = File("rig.session", "polyest session 2\n" + std::string(4, '\0'));
+  // One record: its length, its checksum, and the end.
+  const std::string session =
+      File("rig.session", "polyest session 2\n" + std::string("\x02\0\0\0"
+                                                              "\xdf\x54\x6b\xe6"
+                                                              "\x22\0",
+                                                              10));
   for (const std::vector<std::string>& command : {std::vector<std::string>{"models"},
                                                   {"watch", "rig"},
                                                   {"export", "rig", folder_ / "exported"},

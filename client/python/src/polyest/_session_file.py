@@ -1,6 +1,6 @@
 """Session files, as `polyest export` writes them.
 
-A line, then records, each after its length and its CRC-32, then a length of 0.
+A line, then records, each after its length and its CRC-32; the last record is the end.
 """
 
 from __future__ import annotations
@@ -47,7 +47,6 @@ class SessionFileWriter:
     def __exit__(self, kind: Optional[type[BaseException]], error: Optional[BaseException],
                  traceback: Optional[TracebackType]) -> None:
         if kind is None:
-            self._out.write(_NUMBER.pack(0))
             self._out.flush()
             os.fsync(self._out.fileno())
             self._out.close()
@@ -66,20 +65,23 @@ def read(file: Union[str, os.PathLike[str]]) -> Iterator[session_service_pb2.Ses
             raise InvalidInput(f"{os.fspath(file)}: is not a session file written by an export")
         for number in itertools.count(1):
             length = _read_number(source)
-            if length == 0:
-                return
             checksum = _read_number(source)
             encoded = source.read(length or 0)
             where = f"{os.fspath(file)}: record {number}"
             if length is None or checksum is None or len(encoded) < length:
-                raise InvalidInput(f"{os.fspath(file)}: ends in record {number}, without an end")
+                raise InvalidInput(f"{where} is cut off or missing: the file is incomplete")
             if zlib.crc32(encoded) != checksum:
                 raise InvalidInput(f"{where} is damaged: its checksum is not that of its bytes")
             try:
                 record = session_service_pb2.SessionRecord.FromString(encoded)
             except message.DecodeError as error:
                 raise InvalidInput(f"{where} is damaged: {error}") from error
+            ended = record.HasField("end")
+            if ended and source.read(1):
+                raise InvalidInput(f"{where} is the end, but more follows: the file is damaged")
             yield record
+            if ended:
+                return
 
 
 def _read_number(source: BinaryIO) -> Optional[int]:

@@ -33,6 +33,11 @@ class Reader final : public grpc::ServerCallbackReader<v1::ImportSessionRequest>
     *request_->mutable_record() = record;
     call_.OnReadDone(true);
   }
+  // Waits until the import asks for a record, and ends the stream.
+  void End() {
+    asked_.acquire();
+    call_.OnReadDone(false);
+  }
   void SendInitialMetadata() override {}
   void Read(v1::ImportSessionRequest* request) override {
     request_ = request;
@@ -115,6 +120,24 @@ TEST_F(ImportCallTest, KeepsNothingWhenItIsCancelledWhileARecordIsTaken) {
   import->OnCancel();
   journal_.Release();
   EXPECT_EQ(finished.get_future().get(), grpc::StatusCode::CANCELLED);
+  import->OnDone();
+}
+
+// gRPC may report the end of a stream that was cancelled before it reports that it was cancelled.
+TEST_F(ImportCallTest, KeepsNothingOfAStreamThatEndsAfterTheLastBatchWithoutItsEnd) {
+  ServiceContext context = Context();
+  auto* const import = new ImportCall(context, call_, &imported_);
+  std::promise<grpc::Status> finished;
+  Reader reader(*import, [&](const grpc::Status& status) { finished.set_value(status); });
+  v1::SessionRecord head = Head();
+  head.mutable_head()->set_batch_count(1);
+  reader.Give(head);
+  reader.Give(Batch());
+  reader.End();
+  const grpc::Status status = finished.get_future().get();
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_EQ(status.error_message(), "record: the session breaks off before its end");
+  EXPECT_TRUE(absl::IsNotFound(journal_.ReadProblem(1).status()));
   import->OnDone();
 }
 

@@ -47,6 +47,12 @@ class SessionRegistryTest : public testing::Test {
     return request;
   }
 
+  static v1::ImportSessionRequest End() {
+    v1::ImportSessionRequest request;
+    request.mutable_record()->mutable_end();
+    return request;
+  }
+
   static v1::Measurements Rows(const std::vector<double>& times) {
     v1::Measurements batch;
     auto& x = *batch.add_channels();
@@ -147,6 +153,8 @@ TEST_F(SessionRegistryTest, HoldsNoMoreThanItsLimitHoweverManyImportsBeganBefore
   SessionImport first(*registry_, "t"), second(*registry_, "t");
   ASSERT_TRUE(first.Take(ImportOf("a")).ok());
   ASSERT_TRUE(second.Take(ImportOf("b")).ok());
+  ASSERT_TRUE(first.Take(End()).ok());
+  ASSERT_TRUE(second.Take(End()).ok());
   EXPECT_TRUE(first.Finish().ok());
   EXPECT_EQ(RefusalOf(second.Finish().status())->limit, "--max-sessions");
   EXPECT_THAT(NamesAfter("", 9), testing::ElementsAre("sessions/a"));
@@ -196,7 +204,10 @@ TEST_F(SessionRegistryTest, AgreesWithTheJournalHoweverCreationsImportsAndDeleti
           break;
         case 1: {
           SessionImport import(*registry_, "t");
-          balance += import.Take(ImportOf("a")).ok() && import.Finish().ok() ? 1 : 0;
+          balance +=
+              import.Take(ImportOf("a")).ok() && import.Take(End()).ok() && import.Finish().ok()
+                  ? 1
+                  : 0;
           break;
         }
         default:
@@ -223,7 +234,7 @@ TEST_F(SessionRegistryTest, HasASessionThatTakesTheNameOfOneJustBeingDeleted) {
   limits_.sessions = 2;
   Open();
   SessionImport import(*registry_, "t");
-  ASSERT_TRUE(import.Take(ImportOf("a")).ok());
+  ASSERT_TRUE(import.Take(ImportOf("a")).ok() && import.Take(End()).ok());
   ASSERT_TRUE(StatusOfCreate("a").ok());
   const auto old = *registry_->Get("t", "sessions/a");
   journal_.AfterDeleting([&] { EXPECT_TRUE(import.Finish().ok()); });
