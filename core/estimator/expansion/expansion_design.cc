@@ -245,8 +245,8 @@ void SamplingBox(const ExpansionDesign& design, Vector& lower, Vector& upper) {
   upper = middle + half;
 }
 
-std::vector<int> LeaningAxes(const ExpansionDesign& design, const Prior& prior, const Matrix& etas,
-                             double fraction) {
+std::vector<int> LeaningAxes(const ExpansionDesign& design, const Prior& prior,
+                             const Element& element, const Matrix& etas, double fraction) {
   const Matrix units = InBoxUnits(design, etas);
   const Region trusted = TrustedRegion(design);
   std::vector<int> leaning;
@@ -259,7 +259,7 @@ std::vector<int> LeaningAxes(const ExpansionDesign& design, const Prior& prior, 
       Vector beyond = units.row(i).transpose();
       beyond[j] *= kBeyond;
       const Vector xi = trusted.ToGerm(beyond);
-      if (prior.Contains(xi) && design.element.Contains(xi)) ++goes_on;
+      if (prior.Contains(xi) && element.Contains(xi)) ++goes_on;
     }
     if (at_edge > fraction * static_cast<double>(units.rows()) &&
         goes_on > kGoesOnFraction * at_edge) {
@@ -267,6 +267,23 @@ std::vector<int> LeaningAxes(const ExpansionDesign& design, const Prior& prior, 
     }
   }
   return leaning;
+}
+
+Element WithinKnown(const ResolvedProblem& problem, const Element& element) {
+  const EndedRuns* ended = problem.ended_runs();
+  if (ended == nullptr) return element;
+  std::vector<Element::Bound> bounds = element.bounds();
+  const std::vector<int> shared = problem.SharedParameters();
+  const Matrix to_local = Inverse(ended->region.axes());
+  for (Eigen::Index i = 0; i < to_local.rows(); ++i) {
+    for (const double side : {1.0, -1.0}) {
+      Element::Bound bound{Vector::Zero(problem.dimension()), 0};
+      bound.normal(shared) = side * to_local.row(i).transpose();
+      bound.offset = kOvershoot + bound.normal(shared).dot(ended->region.centre());
+      bounds.push_back(std::move(bound));
+    }
+  }
+  return Element(std::move(bounds));
 }
 
 Region WidenedRegion(const ExpansionDesign& design, const Matrix& etas,

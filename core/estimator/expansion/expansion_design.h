@@ -102,10 +102,14 @@ Region TrustedRegion(const ExpansionDesign& design);
 void SamplingBox(const ExpansionDesign& design, Vector& lower, Vector& upper);
 
 // Returns the axes of the trusted region at whose edge more than this fraction of the particles (W
-// × n, local coordinates) lie although Ω and the element extend beyond it.
+// × n, local coordinates) lie although Ω and `element` extend beyond it.
 inline constexpr double kLeaningFraction = 0.01;
-std::vector<int> LeaningAxes(const ExpansionDesign& design, const Prior& prior, const Matrix& etas,
+std::vector<int> LeaningAxes(const ExpansionDesign& design, const Prior& prior,
+                             const Element& element, const Matrix& etas,
                              double fraction = kLeaningFraction);
+// Returns the part of an element in which the ended runs are known: within the box that their terms
+// cover (ended_runs.h), with the overshoot. Beyond it their polynomials say nothing.
+Element WithinKnown(const ResolvedProblem& problem, const Element& element);
 
 // Returns the trusted region, `factor` times as wide along `axes` and shifted along them to the
 // particles' mean (particles in local coordinates).

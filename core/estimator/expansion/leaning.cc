@@ -34,7 +34,7 @@ bool MayLean(const Cost& cost, const ExpansionDesign& design, const Vector& star
       Vector beyond = minimum.point;
       beyond[j] = middle[j] + side * kPastEdge * half[j];
       const Vector xi = design.region.ToGerm(beyond);
-      if (cost.prior().Contains(xi) && design.element.Contains(xi)) return true;
+      if (cost.prior().Contains(xi) && cost.element().Contains(xi)) return true;
     }
   }
   return false;

@@ -54,8 +54,7 @@ class Settler {
       POLYEST_ASSIGN_OR_RETURN(const bool sampled, Sample(attempt));
       if (!sampled) break;
       const ExpansionDesign& design = expansion().design();
-      const std::vector<int> leaning =
-          LeaningAxes(design, request_.problem->prior(), particles_.etas);
+      const std::vector<int> leaning = Leaning(design, particles_.etas);
       if (!leaning.empty()) {
         POLYEST_ASSIGN_OR_RETURN(const bool moved, Widen(leaning));
         if (!moved) break;
@@ -94,6 +93,11 @@ class Settler {
     return truncation;
   }
 
+  std::vector<int> Leaning(const ExpansionDesign& design, const Matrix& etas) const {
+    return LeaningAxes(design, request_.problem->prior(),
+                       WithinKnown(*request_.problem, design.element), etas);
+  }
+
   // Whether the particles of the last settlement say that this one would leave all as it is. In
   // more dimensions, where elements are few, drawing them again is the surer search for pieces of
   // the posterior that they overlooked.
@@ -104,7 +108,7 @@ class Settler {
     Cost cost = present_.MakeCost(request_.problem->problem().regularization);
     cost.set_power(LikelihoodPower(present_, cost));
     const Matrix etas = Reweighted(request_.guesses, request_.memory.costs, cost, design);
-    return etas.rows() > 0 && LeaningAxes(design, request_.problem->prior(), etas).empty() &&
+    return etas.rows() > 0 && Leaning(design, etas).empty() &&
            !Pays(RegionOfParticles(design.region.ManyToGerm(etas)));
   }
 

@@ -375,7 +375,7 @@ void RegionalExpansion::AddDifference(int channel, const ConstVectorRef& coeffic
 
 Cost RegionalExpansion::MakeCost(double regularization) const {
   Cost cost(design_.basis, design_.region, design_.reference, Mismatch(absorbed_.sums),
-            problem_.prior(), regularization, design_.element);
+            problem_.prior(), regularization, WithinKnown(problem_, design_.element));
   cost.set_power(1 / noise_.misfit);
   cost.set_threads(threads_);
   if (remainder_.size() > 0) cost.set_remainder(remainder_);

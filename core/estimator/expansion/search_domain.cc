@@ -17,7 +17,8 @@ void Constrain(const Vector& row, double bound, MinimizationProblem& search) {
 
 // Returns the box of the search, with Ω and the element in local coordinates as rows a with
 // aᵀη ≤ bound.
-MinimizationProblem SearchDomain(const ExpansionDesign& design, const Prior& prior) {
+MinimizationProblem SearchDomain(const ExpansionDesign& design, const Prior& prior,
+                                 const Element& element) {
   MinimizationProblem search;
   SamplingBox(design, search.lower, search.upper);
   const int n = prior.dimension();
@@ -37,7 +38,7 @@ MinimizationProblem SearchDomain(const ExpansionDesign& design, const Prior& pri
                 bound - off - sign * design.region.centre()[i], search);
     }
   }
-  for (const Element::Bound& bound : design.element.bounds()) {
+  for (const Element::Bound& bound : element.bounds()) {
     Constrain(design.region.axes().transpose() * bound.normal,
               bound.offset - bound.normal.dot(design.region.centre()), search);
   }
@@ -47,7 +48,7 @@ MinimizationProblem SearchDomain(const ExpansionDesign& design, const Prior& pri
 }  // namespace
 
 MinimizationProblem SearchOf(const Cost& cost, const ExpansionDesign& design) {
-  MinimizationProblem search = SearchDomain(design, cost.prior());
+  MinimizationProblem search = SearchDomain(design, cost.prior(), cost.element());
   search.threads = cost.threads();
   search.function = [&cost](const Vector& eta, Vector* gradient) {
     if (gradient == nullptr) return cost.Evaluate(eta).total;

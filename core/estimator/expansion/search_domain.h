@@ -1,7 +1,7 @@
 #pragma once
 
 // The search domain for minima of the cost: the box in which the expansion is trusted (with its
-// overshoot), intersected with Ω and the element.
+// overshoot), intersected with Ω and the part of it in which the cost is defined.
 
 #include "core/bayes/cost.h"
 #include "core/bayes/minimizer.h"

@@ -139,7 +139,8 @@ class Assessment {
         posterior_.Germs(prior_)(EquallyWeighted(posterior_.weights, kDrawsForEdges), Eigen::all);
     findings_.leans =
         findings_.leans || PressesOnDropped(xis) ||
-        !LeaningAxes(design_, prior_, design_.region.ManyToLocal(xis), kOverEdge).empty();
+        !LeaningAxes(design_, prior_, design_.element, design_.region.ManyToLocal(xis), kOverEdge)
+             .empty();
   }
 
   // Whether the posterior presses on a bound of its element beyond which all has been dropped: that

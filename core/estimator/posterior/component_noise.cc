@@ -141,6 +141,7 @@ absl::StatusOr<bool> MixtureComponent::LearnNoise(const Stop& stop) {
       if (!reweighed) break;
       row_end_.settles = true;
     }
+    POLYEST_RETURN_IF_ERROR(RenewEndedRuns(stop));
     if (adaptive()) {
       POLYEST_RETURN_IF_ERROR(TightenTolerance(stop).status());
       POLYEST_RETURN_IF_ERROR(SettleIfInaccurate(stop).status());

@@ -6,9 +6,11 @@
 // ended runs have. It is valid near there only. When the posterior has contracted to less than 0.7
 // standard deviations in any direction, or has moved by more than one of them, or the noise's scale
 // has changed by a quarter, or its correlation, all ended runs are eliminated again about the
-// present posterior. As standard deviations fall with 1/√R, this happens about whenever the number
-// R of runs has doubled, and all eliminations together take about 1 + ½ + ¼ + … = 2 times as long
-// as one of each run. All of it is a function of the rows alone.
+// present posterior: at the end of a run, and after a revision of the noise, because another scale
+// is learned from what the ended runs say with the present one. As standard deviations fall with
+// 1/√R, this happens about whenever the number R of runs has doubled, and all eliminations together
+// take about 1 + ½ + ¼ + … = 2 times as long as one of each run. All of it is a function of the
+// rows alone.
 
 #include <algorithm>
 #include <cmath>
@@ -142,15 +144,16 @@ absl::StatusOr<int64_t> MixtureComponent::EliminateLast(const GermSummary& poste
                       PathIn(problem_, run, posterior, ended.region.centre()), stop, ended);
 }
 
-// Eliminates all runs so far about the particles, and returns the trajectories × rows that it took.
-absl::StatusOr<int64_t> MixtureComponent::EliminateAll(const Matrix& particles, const Stop& stop,
-                                                       EndedRuns& ended) const {
+// Eliminates all runs in the first `rows` rows about the particles, and returns the trajectories ×
+// rows that it took.
+absl::StatusOr<int64_t> MixtureComponent::EliminateAll(const Matrix& particles, int64_t rows,
+                                                       const Stop& stop, EndedRuns& ended) const {
   const EliminationRequest request{&problem_, store_, threads_, expansion_->noise()};
   const GermSummary posterior = SummaryOfParticles(particles);
   const Matrix shared = particles(Eigen::all, problem_.SharedParameters());
   ended = WithoutEndedRuns(problem_, RegionOfParticles(shared), Shared(problem_, posterior),
                            expansion_->noise());
-  POLYEST_ASSIGN_OR_RETURN(const std::vector<RunRows> runs, FindRuns(*store_, taken_));
+  POLYEST_ASSIGN_OR_RETURN(const std::vector<RunRows> runs, FindRuns(*store_, rows));
   const EndedRuns* before = problem_.ended_runs();
   const size_t known = before != nullptr ? before->run.size() : 0;
   int64_t propagated = 0;
@@ -189,7 +192,7 @@ absl::Status MixtureComponent::BeginRunAlone(int run, const Stop& stop) {
       POLYEST_ASSIGN_OR_RETURN(particles, ParticlesNow(stop));
       posterior = SummaryOfParticles(*particles);
     }
-    POLYEST_ASSIGN_OR_RETURN(work, EliminateAll(*particles, stop, *ended));
+    POLYEST_ASSIGN_OR_RETURN(work, EliminateAll(*particles, taken_, stop, *ended));
   }
   next.set_ended_runs(std::move(ended));
   POLYEST_RETURN_IF_ERROR(GoOnWith(std::move(next), Shared(problem_, *posterior), stop));
@@ -199,6 +202,33 @@ absl::Status MixtureComponent::BeginRunAlone(int run, const Stop& stop) {
     ++reexpansions_;
   }
   return absl::OkStatus();
+}
+
+// Eliminates the ended runs again if they were eliminated with another noise. A stop changes
+// nothing.
+absl::Status MixtureComponent::RenewEndedRuns(const Stop& stop) {
+  const EndedRuns* before = problem_.ended_runs();
+  if (before == nullptr || HoldsWith(*before, expansion_->noise()) || IsReplayWithheld()) {
+    return absl::OkStatus();
+  }
+  POLYEST_ASSIGN_OR_RETURN(Matrix particles, ParticlesNow(stop));
+  auto ended = std::make_shared<EndedRuns>();
+  POLYEST_ASSIGN_OR_RETURN(const int64_t work, EliminateAll(particles, before->rows, stop, *ended));
+  ResolvedProblem renewed = problem_;
+  renewed.set_ended_runs(std::move(ended));
+  POLYEST_RETURN_IF_ERROR(ReplayAs(std::move(renewed), expansion_->design(),
+                                   expansion_->noise().ForNewExpansion(), std::move(particles),
+                                   stop));
+  abandoned_rows_ += work;
+  ++settlements_;
+  ++reexpansions_;
+  return absl::OkStatus();
+}
+
+// A new run tells nothing yet, however long the record is.
+void MixtureComponent::CountWindowsAnew() {
+  windows_from_ = patient_until_ = taken_;
+  window_end_ = taken_ + 2;
 }
 
 // Goes on with a problem whose run has no rows yet; `shared` is the posterior of the shared germs.
@@ -213,7 +243,10 @@ absl::Status MixtureComponent::GoOnWith(ResolvedProblem next, const GermSummary&
   ExpansionDesign design =
       DesignAfterEndedRuns(next, shared.mean, factor, expansion_->design().element);
   Matrix draws = DrawsForNewRun(next, shared.mean, factor, kDrawsToBegin).etas;
-  return ReplayAs(std::move(next), std::move(design), std::move(noise), std::move(draws), stop);
+  POLYEST_RETURN_IF_ERROR(
+      ReplayAs(std::move(next), std::move(design), std::move(noise), std::move(draws), stop));
+  CountWindowsAnew();
+  return absl::OkStatus();
 }
 
 }  // namespace polyest::internal

@@ -78,7 +78,8 @@ MisfitFound FindMisfit(const ResolvedProblem& problem, const RegionalExpansion& 
   if (!(excess > kDeviations * std::sqrt(2 * degrees))) return {};
   if (HeldByPrior(expansion, cost, minimum.point) > kMostlyPrior * excess) return {};
   const Matrix point = minimum.point.transpose();
-  return {chi_squared / degrees, !LeaningAxes(design, problem.prior(), point).empty()};
+  return {chi_squared / degrees,
+          !LeaningAxes(design, problem.prior(), cost.element(), point).empty()};
 }
 
 }  // namespace polyest::internal

@@ -114,8 +114,10 @@ absl::Status MixtureComponent::BeginRun(int run, const Stop& stop) {
   noise.posterior = SummaryForNewRuns(grown, noise.posterior);
   noise.centre.resize(0);
   Matrix particles = ParticlesForNewRuns(grown, particles_);
-  return ReplayAs(std::move(grown), std::move(design), std::move(noise), std::move(particles),
-                  stop);
+  POLYEST_RETURN_IF_ERROR(
+      ReplayAs(std::move(grown), std::move(design), std::move(noise), std::move(particles), stop));
+  CountWindowsAnew();
+  return absl::OkStatus();
 }
 
 // Propagates the record so far again for a problem with other runs, whose particles are given.
@@ -132,8 +134,6 @@ absl::Status MixtureComponent::ReplayAs(ResolvedProblem problem, ExpansionDesign
   Adopt(*std::move(replayed));
   particles_ = std::move(particles);
   memory_ = {};
-  windows_from_ = patient_until_ = taken_;
-  window_end_ = taken_ + 2;
   return absl::OkStatus();
 }
 
@@ -228,7 +228,7 @@ absl::StatusOr<bool> MixtureComponent::SettleAfterWindow(const Stop& stop) {
   }
   row_end_ = {};  // where nothing was settled
   window_end_ = NextWindow(taken_, windows_from_);
-  const int64_t to_learn = MinSamplesForNoise(problem_.dimension());
+  const int64_t to_learn = MinSamplesForNoise(problem_);
   if (learns_noise_ && taken_ < to_learn) window_end_ = std::min(window_end_, to_learn);
   edges_row_ = NextLook();
   return moved;

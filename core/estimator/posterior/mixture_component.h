@@ -120,13 +120,15 @@ class MixtureComponent {
   absl::Status BeginRunAlone(int run, const Stop& stop);
   absl::Status ReplayAs(ResolvedProblem problem, ExpansionDesign design, LearnedNoise noise,
                         Matrix particles, const Stop& stop);
+  void CountWindowsAnew();
   absl::Status GoOnWith(ResolvedProblem next, const GermSummary& shared, const Stop& stop);
   absl::StatusOr<Matrix> ParticlesNow(const Stop& stop) const;
   std::optional<GermSummary> GaussianPosterior(const Stop& stop) const;
   absl::StatusOr<int64_t> EliminateLast(const GermSummary& posterior, const Stop& stop,
                                         EndedRuns& ended) const;
-  absl::StatusOr<int64_t> EliminateAll(const Matrix& particles, const Stop& stop,
+  absl::StatusOr<int64_t> EliminateAll(const Matrix& particles, int64_t rows, const Stop& stop,
                                        EndedRuns& ended) const;
+  absl::Status RenewEndedRuns(const Stop& stop);
   absl::StatusOr<bool> AbsorbBlock(const RowBlock& block, const Stop& stop);
   absl::StatusOr<bool> FinishRow(const Stop& stop);
   absl::StatusOr<bool> SettleBefore(int row, const Stop& stop);

@@ -91,7 +91,7 @@ class Revision {
       RevisePredicted(c, model);
       if (!model.unknown && model.correlation != NoiseCorrelation::kUnknown) continue;
       const ChannelSums& sums = expansion_.sums()[static_cast<size_t>(c)];
-      if (sums.samples.count() < MinSamplesForNoise(problem_.dimension())) continue;
+      if (sums.samples.count() < MinSamplesForNoise(problem_)) continue;
       // Samples that are all 0 do not tell how large their noise is.
       const bool silent = record_.channels()[static_cast<size_t>(c)].largest <= 0;
       if (model.unknown && silent) continue;
@@ -182,7 +182,7 @@ class Revision {
     if (!IsOfPrediction(model) || !problem_.problem().expansion.adaptive) return;
     if (!noise.of_prediction) {
       const ChannelSums& sums = expansion_.sums()[static_cast<size_t>(c)];
-      if (sums.samples.count() < MinSamplesForNoise(problem_.dimension())) return;
+      if (sums.samples.count() < MinSamplesForNoise(problem_)) return;
       if (expansion_.Discount(c) > kMaxDiscountOfPrediction * sums.Degrees()) return;
       if (!model.unknown && sums.samples.ChiSquared(d_) > kMaxMisfit * sums.Degrees()) return;
     } else {
@@ -336,6 +336,12 @@ class Revision {
 };
 
 }  // namespace
+
+int64_t MinSamplesForNoise(const ResolvedProblem& problem) {
+  const EndedRuns* ended = problem.ended_runs();
+  const int64_t of_ended = ended == nullptr ? 0 : ended->own_parameters() * std::ssize(ended->run);
+  return MinSamplesForNoise(problem.dimension() + of_ended);
+}
 
 std::optional<double> UnlearnedScale(const RecordSummary& record, size_t channel, double value,
                                      double predicted, double present) {

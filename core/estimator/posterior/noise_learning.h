@@ -32,7 +32,10 @@ namespace polyest::internal {
 // Returns the number of samples of a channel from which its noise is learned, for n unknowns. The
 // likelihood with the scale integrated out has (N − n)/2 degrees of freedom; with 4 to spare the
 // scale may still collapse onto a chance fit, with 6 it does not.
-inline int MinSamplesForNoise(int n) { return n + 6; }
+inline int64_t MinSamplesForNoise(int64_t n) { return n + 6; }
+// Returns it for all unknowns of the record so far, with those of ended runs, which the samples had
+// to tell as well.
+int64_t MinSamplesForNoise(const ResolvedProblem& problem);
 
 // Returns the scale of a channel whose scale is not learned yet that its next sample asks for, or
 // nullopt if the present one stays. `value` is |z| of that sample, in units of the noise that the

@@ -154,7 +154,7 @@ std::string ReasonNotLearned(const Findings& findings, size_t c) {
   }
   if (!model.unknown && !correlation) return "";
   if (!noise.learned) {
-    const int least = MinSamplesForNoise(findings.problem->dimension());
+    const int64_t least = MinSamplesForNoise(*findings.problem);
     const std::string why =
         model.unknown && channel.largest <= 0
             ? "all samples are 0, from which its noise cannot be learned"

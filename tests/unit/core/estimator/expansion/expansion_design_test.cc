@@ -190,26 +190,52 @@ TEST(LeaningAxes, AreThoseAtWhoseEdgeParticlesLie) {
   const ResolvedProblem problem = TwoUniforms();
   const ExpansionDesign design = AtTheBound(problem);
   const Prior& prior = problem.prior();
-  EXPECT_THAT(LeaningAxes(design, prior, ParticlesWith(0, {0, 0})), IsEmpty());
-  EXPECT_THAT(LeaningAxes(design, prior, ParticlesWith(50, {0, 0.99})), ElementsAre(1));
-  EXPECT_THAT(LeaningAxes(design, prior, ParticlesWith(50, {0, -1.1})), ElementsAre(1));
-  EXPECT_THAT(LeaningAxes(design, prior, ParticlesWith(50, {-0.99, 0})), ElementsAre(0));
-  EXPECT_THAT(LeaningAxes(design, prior, ParticlesWith(50, {-0.99, 0.99})), ElementsAre(0, 1));
+  EXPECT_THAT(LeaningAxes(design, prior, Element(), ParticlesWith(0, {0, 0})), IsEmpty());
+  EXPECT_THAT(LeaningAxes(design, prior, Element(), ParticlesWith(50, {0, 0.99})), ElementsAre(1));
+  EXPECT_THAT(LeaningAxes(design, prior, Element(), ParticlesWith(50, {0, -1.1})), ElementsAre(1));
+  EXPECT_THAT(LeaningAxes(design, prior, Element(), ParticlesWith(50, {-0.99, 0})), ElementsAre(0));
+  EXPECT_THAT(LeaningAxes(design, prior, Element(), ParticlesWith(50, {-0.99, 0.99})),
+              ElementsAre(0, 1));
 }
 
 TEST(LeaningAxes, AreNotThoseThatEndWithThePrior) {
   const ResolvedProblem problem = TwoUniforms();
-  EXPECT_THAT(LeaningAxes(AtTheBound(problem), problem.prior(), ParticlesWith(50, {0.99, 0})),
-              IsEmpty());
+  EXPECT_THAT(
+      LeaningAxes(AtTheBound(problem), problem.prior(), Element(), ParticlesWith(50, {0.99, 0})),
+      IsEmpty());
   const ExpansionDesign whole = DesignForPrior(problem).value();
-  EXPECT_THAT(LeaningAxes(whole, problem.prior(), ParticlesWith(50, {0.99, -0.99})), IsEmpty());
+  EXPECT_THAT(LeaningAxes(whole, problem.prior(), Element(), ParticlesWith(50, {0.99, -0.99})),
+              IsEmpty());
 }
 
 TEST(LeaningAxes, TakeMoreThanOneParticleInAHundred) {
   const ResolvedProblem problem = TwoUniforms();
   const ExpansionDesign design = AtTheBound(problem);
-  EXPECT_THAT(LeaningAxes(design, problem.prior(), ParticlesWith(10, {0, 0.99})), IsEmpty());
-  EXPECT_THAT(LeaningAxes(design, problem.prior(), ParticlesWith(11, {0, 0.99})), ElementsAre(1));
+  EXPECT_THAT(LeaningAxes(design, problem.prior(), Element(), ParticlesWith(10, {0, 0.99})),
+              IsEmpty());
+  EXPECT_THAT(LeaningAxes(design, problem.prior(), Element(), ParticlesWith(11, {0, 0.99})),
+              ElementsAre(1));
+}
+
+// Of the ended runs only their region counts here, a box along (1, 1) and (−1, 1) about (0.2, 0).
+TEST(WithinKnown, IsTheBoxOfTheEndedRunsWithTheOvershoot) {
+  ResolvedProblem problem = TwoUniforms();
+  const Element all;
+  EXPECT_TRUE(WithinKnown(problem, all).bounds().empty());
+  auto ended = std::make_shared<EndedRuns>();
+  Matrix axes(2, 2);
+  axes << 0.3, -0.1, 0.3, 0.1;
+  ended->region = Region(Eigen::Vector2d(0.2, 0), axes);
+  problem.set_ended_runs(ended);
+  const Element known = WithinKnown(problem, all);
+  for (const Eigen::Vector2d& eta :
+       {Eigen::Vector2d(1, 1), Eigen::Vector2d(-1, 1), Eigen::Vector2d(0, -1)}) {
+    EXPECT_TRUE(known.Contains(ended->region.ToGerm(0.99 * kOvershoot * eta)));
+    EXPECT_FALSE(known.Contains(ended->region.ToGerm(1.01 * kOvershoot * eta)));
+  }
+  // What bounds the element still does.
+  const auto [below, above] = all.Divide(Eigen::Vector2d(1, 0), 0.2);
+  EXPECT_FALSE(WithinKnown(problem, below).Contains(Eigen::Vector2d(0.21, 0)));
 }
 
 TEST(WidenedRegion, IsWiderAndShiftedAlongItsAxesAlone) {
