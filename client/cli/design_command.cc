@@ -163,8 +163,8 @@ void PrintTables(const Design& design, std::ostream& out) {
   out << "\nThe best times for samples of " << Planned(best) << of_best
       << ", each in addition to those above it:\n\n";
   PrintSamples(design, best, out);
-  out << absl::StrFormat("\nexpansion: order %d, %d terms, %d points\n", best.expansion().order(),
-                         best.expansion().term_count(), best.expansion().point_count());
+  out << absl::StrFormat("\nslopes of the model at %d draws, by %d trajectories\n",
+                         best.draw_count(), best.trajectory_count());
   PrintDiagnostics(design.diagnostics(), out);
   PrintDiagnostics(best.diagnostics(), out);
 }

@@ -122,14 +122,6 @@ v1::ComputeExperimentDesignRequest Alternatives(const v1::Problem& problem, doub
   return request;
 }
 
-// Whether the expansion over the prior follows the model: where it does not, it may tell parameters
-// apart that the model cannot.
-bool FollowsModel(const Design::Candidate& candidate) {
-  return std::ranges::none_of(candidate.diagnostics(), [](const v1::Diagnostic& diagnostic) {
-    return diagnostic.code() == v1::Diagnostic::EXPANSION_INACCURATE;
-  });
-}
-
 // Returns a sentence that proposes how to identify the i-th parameter, or says that no alternative
 // considered would.
 std::string Proposal(const Design& design, int i, const v1::ParameterEstimate& p) {
@@ -142,7 +134,7 @@ std::string Proposal(const Design& design, int i, const v1::ParameterEstimate& p
     best = absl::StrFormat("%s would determine %s to ±%s", what, p.name(), FormatNumber(sd, 2));
   };
   for (const Design::Candidate& candidate : design.candidates()) {
-    if (!candidate.name().empty() || !FollowsModel(candidate)) continue;
+    if (!candidate.name().empty()) continue;
     if (helps(candidate.gain().std_dev(i))) {
       return absl::StrCat("According to the prior, this experiment should identify ", p.name(),
                           "; check the noise and the model.");
@@ -161,12 +153,6 @@ std::string Proposal(const Design& design, int i, const v1::ParameterEstimate& p
              absl::StrCat("Another excitation, ", candidate.name(), ","));
   }
   if (!best.empty()) return best + ".";
-  if (!std::ranges::all_of(design.candidates(), FollowsModel)) {
-    return absl::StrCat(
-        "Over so long a time and so wide a prior the expansion cannot tell what would "
-        "identify ",
-        p.name(), "; try a shorter --until of polyest design, or narrower priors.");
-  }
   return absl::StrCat(
       "No other output of the model would identify ", p.name(), " in this experiment",
       design.candidates_size() > 1 ? ", nor would any of its inputs alone" : "",

@@ -106,12 +106,16 @@ absl::StatusOr<std::vector<int>> ChooseOutputs(const ResolvedProblem& problem,
   return chosen;
 }
 
+absl::Status CheckIsOfThePrior(const ResolvedProblem& problem) {
+  POLYEST_RETURN_IF_ERROR(RefuseFilters(problem.problem(), "a study of the prior"));
+  return CheckNoStreamedInput(problem);
+}
+
 absl::StatusOr<std::unique_ptr<PriorExpansion>> PriorExpansion::Make(const ResolvedProblem& problem,
                                                                      std::vector<int> outputs,
                                                                      int threads,
                                                                      const Stop& stop) {
-  POLYEST_RETURN_IF_ERROR(RefuseFilters(problem.problem(), "a study of the prior"));
-  POLYEST_RETURN_IF_ERROR(CheckNoStreamedInput(problem));
+  POLYEST_RETURN_IF_ERROR(CheckIsOfThePrior(problem));
   const ExpansionOptions& design = problem.problem().expansion;
   const std::vector<Germ>& germs = problem.prior().germs();
   auto basis = std::make_shared<const Basis>(germs, FirstTruncation(design, problem.dimension()));

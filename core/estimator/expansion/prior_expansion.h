@@ -46,6 +46,11 @@ absl::Status CheckAnswerSize(const TimeGrid& grid, size_t outputs, int64_t numbe
 absl::StatusOr<std::vector<int>> ChooseOutputs(const ResolvedProblem& problem,
                                                const std::vector<std::string>& asked);
 
+// Returns InvalidArgument where a study that needs no data is not possible: with a likelihood of
+// prediction errors, or naming `inputs` when an input is streamed, because there are no data to
+// provide it.
+absl::Status CheckIsOfThePrior(const ResolvedProblem& problem);
+
 // The expansions of m outputs at consecutive times. Output i at time first_time + k is column k·m +
 // i.
 struct ExpandedOutputs {
@@ -59,8 +64,7 @@ struct ExpandedOutputs {
 
 class PriorExpansion {
  public:
-  // Makes the expansion. Returns InvalidArgument naming `inputs` when an input is streamed, because
-  // there are no data to provide it; other errors are those of CollocationPoints and
+  // Makes the expansion. Errors are those of CheckIsOfThePrior, CollocationPoints and
   // CollocationMatrix::Factor. `problem` must outlive the expansion.
   static absl::StatusOr<std::unique_ptr<PriorExpansion>> Make(const ResolvedProblem& problem,
                                                               std::vector<int> outputs, int threads,

@@ -1,8 +1,6 @@
 #include "core/estimator/studies/experiment_design.h"
-#include "core/estimator/problem/validate_noise.h"
 
 #include <absl/strings/str_format.h>
-#include <absl/strings/str_join.h>
 
 #include <algorithm>
 #include <cmath>
@@ -11,7 +9,9 @@
 #include "core/common/status.h"
 #include "core/estimator/expansion/prior_expansion.h"
 #include "core/estimator/problem/assumed_noise.h"
+#include "core/estimator/problem/validate_noise.h"
 #include "core/estimator/studies/information_gain.h"
+#include "core/estimator/studies/model_slopes.h"
 #include "core/estimator/studies/prior_propagation.h"
 #include "core/estimator/studies/sample_times.h"
 #include "core/model/list_names.h"
@@ -20,9 +20,6 @@ namespace polyest::internal {
 namespace {
 
 constexpr int kDraws = 64;  // number of draws of the true value
-// Root mean square of the residual, in units of the noise, above which an expansion is reported as
-// inaccurate.
-constexpr double kInaccurateResidual = 0.5;
 
 // An output that is, or could be, measured.
 struct Candidate {
@@ -67,39 +64,17 @@ absl::StatusOr<std::vector<Candidate>> FindCandidates(const ResolvedProblem& pro
   return candidates;
 }
 
-// The expansions of all candidates at all times; output i at time k is column k·m + i.
-struct ExpandedRecord {
-  Matrix coefficients;  // S × (m · times)
-  Vector residual_variance;
-};
-
-absl::StatusOr<ExpandedRecord> Expand(PriorExpansion& expansion, const TimeGrid& grid, int m,
-                                      const Stop& stop) {
-  const Eigen::Index columns = grid.count() * m;
-  ExpandedRecord record{Matrix(expansion.basis().size(), columns), Vector(columns)};
-  POLYEST_RETURN_IF_ERROR(expansion.Run(
-      grid,
-      [&](const ExpandedOutputs& expanded) {
-        const Matrix& coefficients = expanded.expansion.coefficients();
-        const Eigen::Index first = expanded.first_time * m;
-        record.coefficients.middleCols(first, coefficients.cols()) = coefficients;
-        record.residual_variance.segment(first, coefficients.cols()) = expanded.residual_variance;
-      },
-      stop));
-  return record;
-}
-
 // The samples of the experiment as each draw of the true value predicts them.
 class Outlook {
  public:
-  Outlook(const ResolvedProblem& problem, const PriorExpansion& expansion,
-          const std::vector<Candidate>& candidates, const ExpandedRecord& record)
+  Outlook(const ResolvedProblem& problem, const std::vector<Candidate>& candidates,
+          const ModelAtDraws& model)
       : m_(static_cast<int>(candidates.size())),
-        draws_(problem.prior(), expansion.points(), kDraws),
+        draws_(problem.prior(), model.xis),
         noise_variance_(Vector::Zero(m_)) {
-    const std::vector<NoiseModel> noises = Noises(candidates, record);
-    for (int draw = 0; draw < kDraws; ++draw) AddDraw(draw, expansion.basis(), noises, record);
-    noise_variance_ /= static_cast<double>(kDraws) * static_cast<double>(times());
+    const std::vector<NoiseModel> noises = Noises(candidates, model);
+    for (const OutputsAtDraw& at : model.outputs) AddDraw(at, noises);
+    noise_variance_ /= static_cast<double>(model.outputs.size()) * static_cast<double>(times());
   }
 
   int times() const { return static_cast<int>(slopes_.front().rows()) / m_; }
@@ -132,13 +107,16 @@ class Outlook {
 
  private:
   std::vector<NoiseModel> Noises(const std::vector<Candidate>& candidates,
-                                 const ExpandedRecord& record) const {
-    const Matrix& c = record.coefficients;
-    const Vector mean = c.row(0).transpose();
-    const Vector deviation = c.bottomRows(c.rows() - 1).colwise().norm().transpose();
+                                 const ModelAtDraws& model) const {
+    const Eigen::Index rows = model.outputs.front().values.size();
+    const auto count = static_cast<double>(model.outputs.size());
+    Vector mean = Vector::Zero(rows), square = Vector::Zero(rows);
+    for (const OutputsAtDraw& at : model.outputs) mean += at.values / count;
+    for (const OutputsAtDraw& at : model.outputs) square += (at.values - mean).cwiseAbs2() / count;
+    const Vector deviation = square.cwiseSqrt();
     std::vector<NoiseModel> noises;
     for (int i = 0; i < m_; ++i) {
-      const auto at = Eigen::seq(i, mean.size() - 1, m_);
+      const auto at = Eigen::seq(i, rows - 1, m_);
       const NoiseModel* given = candidates[static_cast<size_t>(i)].noise;
       noises.push_back(given != nullptr ? *given : AssumedNoise(mean(at), deviation(at)));
     }
@@ -146,14 +124,9 @@ class Outlook {
   }
 
   // Adds a_k = L ∂y_k/∂ξ /√R_k at the draw.
-  void AddDraw(int draw, const Basis& basis, const std::vector<NoiseModel>& noises,
-               const ExpandedRecord& record) {
-    Vector phi(basis.size());
-    Matrix gradient(basis.size(), basis.dimension());
-    basis.EvaluateWithGradient(draws_.xi(draw), phi, gradient);
-    const Vector y = record.coefficients.transpose() * phi;
-    Matrix slopes =
-        record.coefficients.transpose() * gradient * draws_.germ_standard_deviation().asDiagonal();
+  void AddDraw(const OutputsAtDraw& at, const std::vector<NoiseModel>& noises) {
+    const Vector& y = at.values;
+    Matrix slopes = at.slopes * draws_.germ_standard_deviation().asDiagonal();
     // An output at rest has the noise of a small part of its later range.
     Vector largest(m_);
     for (int i = 0; i < m_; ++i) {
@@ -165,10 +138,8 @@ class Outlook {
       largest[i] = std::max(largest[i], std::abs(y[row]));
       const double sigma = noises[static_cast<size_t>(i)].StandardDeviation(y[row], largest[i]);
       noise_variance_[i] += sigma * sigma;
-      // R = σ² + residual variance
-      const double variance = sigma * sigma + record.residual_variance[row];
-      if (variance > 0) {
-        slopes.row(row) /= std::sqrt(variance);
+      if (sigma > 0) {
+        slopes.row(row) /= sigma;
       } else {
         slopes.row(row).setZero();  // an output that is always 0 has no relative noise
       }
@@ -237,32 +208,6 @@ absl::Status ChooseTimes(const Outlook& outlook, const TimeGrid& grid, int plann
   return absl::OkStatus();
 }
 
-void Diagnose(const PriorExpansion& expansion, const ExpandedRecord& record, const Outlook& outlook,
-              ExperimentDesign& design) {
-  const auto m = static_cast<int>(design.outputs.size());
-  std::vector<std::string> inaccurate;
-  for (int i = 0; i < m; ++i) {
-    const double residual =
-        record.residual_variance(Eigen::seq(i, record.residual_variance.size() - 1, m)).mean();
-    const double ratio = std::sqrt(residual / outlook.NoiseVariance(i));
-    if (ratio <= kInaccurateResidual) continue;
-    inaccurate.push_back(
-        absl::StrFormat("%s by %.2g", design.outputs[static_cast<size_t>(i)].output, ratio));
-  }
-  if (!inaccurate.empty()) {
-    design.diagnostics.push_back(
-        {DiagnosticCode::kExpansionInaccurate,
-         absl::StrFormat("the expansion differs from the model, in units of the noise: %s; this "
-                         "counts as noise, so that samples tell more than said here as a rule, but "
-                         "less of parameters that the model cannot tell apart; a higher order, a "
-                         "shorter time or narrower priors bring it down",
-                         absl::StrJoin(inaccurate, ", "))});
-  }
-  if (!expansion.failures().empty()) {
-    design.diagnostics.push_back(DescribeFailures(expansion.failures(), expansion.points()));
-  }
-}
-
 }  // namespace
 
 }  // namespace polyest::internal
@@ -293,22 +238,22 @@ absl::StatusOr<ExperimentDesign> DesignExperiment(const ResolvedProblem& problem
   std::vector<int> columns;
   for (const Candidate& candidate : candidates) columns.push_back(candidate.column);
   const auto m = static_cast<int>(columns.size());
-  POLYEST_ASSIGN_OR_RETURN(const auto expansion,
-                           PriorExpansion::Make(problem, columns, options.threads, stop));
   const TimeGrid grid{options.until_s, options.step_s};
-  POLYEST_RETURN_IF_ERROR(CheckAnswerSize(grid, columns.size(),
-                                          expansion->basis().size() + kDraws * problem.dimension(),
+  POLYEST_RETURN_IF_ERROR(CheckAnswerSize(grid, columns.size(), kDraws * (problem.dimension() + 1),
                                           kMaxPropagatedValues));
-  POLYEST_ASSIGN_OR_RETURN(const ExpandedRecord record, Expand(*expansion, grid, m, stop));
-  const Outlook outlook(problem, *expansion, candidates, record);
+  POLYEST_ASSIGN_OR_RETURN(const ModelAtDraws model,
+                           EvaluateAtDraws(problem, columns, DrawTruths(problem.prior(), kDraws),
+                                           grid, options.threads, stop));
+  const Outlook outlook(problem, candidates, model);
   const int planned = problem.channels() > 0 ? problem.channels() : m;
   ExperimentDesign design;
   POLYEST_RETURN_IF_ERROR(CompareOutputs(problem, candidates, outlook, planned, stop, design));
   POLYEST_RETURN_IF_ERROR(ChooseTimes(outlook, grid, planned, options.samples, stop, design));
-  design.order = expansion->basis().order();
-  design.terms = expansion->basis().size();
-  design.points = expansion->points();
-  Diagnose(*expansion, record, outlook, design);
+  design.draws = outlook.draws().count();
+  design.trajectories = model.trajectories;
+  if (!model.failures.empty()) {
+    design.diagnostics.push_back(DescribeFailures(model.failures, model.trajectories));
+  }
   return design;
 }
 

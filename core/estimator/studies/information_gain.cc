@@ -1,19 +1,26 @@
 #include "core/estimator/studies/information_gain.h"
 
 #include <cmath>
+#include <utility>
 
 #include "core/bayes/parameter_covariance.h"
 #include "core/chaos/collocation_points.h"
 #include "core/common/check.h"
 
 namespace polyest::internal {
-TruthDraws::TruthDraws(const Prior& prior, int first, int count)
-    : prior_(prior), mean_(prior.dimension()), scale_(prior.GermStandardDeviation()) {
+
+Matrix DrawTruths(const Prior& prior, int count) {
+  return CollocationPoints(PointSet::kHalton, prior.germs(), 1, count, count).value();
+}
+
+TruthDraws::TruthDraws(const Prior& prior, Matrix xis)
+    : prior_(prior),
+      mean_(prior.dimension()),
+      scale_(prior.GermStandardDeviation()),
+      xis_(std::move(xis)) {
   for (int i = 0; i < prior.dimension(); ++i) {
     mean_[i] = prior.germs()[static_cast<size_t>(i)].Mean();
   }
-  const int all = first + count;
-  xis_ = CollocationPoints(PointSet::kHalton, prior.germs(), 1, all, all).value().bottomRows(count);
 }
 
 InformationGain TruthDraws::Expected(const std::vector<Matrix>& information) const {

@@ -22,11 +22,14 @@
 
 namespace polyest::internal {
 
-// Draws of the true value from a prior: a section of Halton's sequence.
+// Returns `count` draws of the true value from a prior, a row each: points of Halton's sequence.
+Matrix DrawTruths(const Prior& prior, int count);
+
+// Draws of the true value.
 class TruthDraws {
  public:
-  // Takes points first … first + count − 1 of the sequence. `prior` must outlive the draws.
-  TruthDraws(const Prior& prior, int first, int count);
+  // `prior` must outlive the draws, which are rows of `xis`.
+  TruthDraws(const Prior& prior, Matrix xis);
 
   int count() const { return static_cast<int>(xis_.rows()); }
   Vector xi(int draw) const { return xis_.row(draw).transpose(); }

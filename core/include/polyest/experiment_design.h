@@ -8,9 +8,8 @@
 // the prior's, and the information gained is ½ log₂ det M bits: one bit halves the standard
 // deviation in one direction. Expected values are means over draws of the truth from the prior
 // (K. Chaloner and I. Verdinelli, "Bayesian experimental design: a review", Statist. Sci. 10,
-// 1995). Slopes are those of the expansion over the prior, and its residual variance counts as
-// noise. An inaccurate expansion thus promises too little as a rule, but too much of parameters
-// that the model cannot tell apart, where its own slopes do: kExpansionInaccurate warns of both.
+// 1995). Slopes are the model's own at each draw, by central differences: those of an expansion
+// over a wide prior would tell parameters apart that the model cannot.
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
@@ -72,11 +71,9 @@ struct ExperimentDesign {
   InformationGain gain;
   std::vector<OutputGain> outputs;  // the measured ones first
   std::vector<SampleTime> samples;  // of the same outputs, in the order of their choice
-  int order = 0;                    // of the expansion, p
-  int terms = 0;                    // of the expansion, S
-  int points = 0;                   // of collocation, Q
-  // kExpansionInaccurate when an output's residual is no longer small beside its noise;
-  // kPointsFailed.
+  int draws = 0;                    // of the true value, over which gains are averaged
+  int trajectories = 0;             // integrated for the slopes
+  // kPointsFailed where a trajectory could not be integrated; its draw is left out.
   std::vector<Diagnostic> diagnostics;
 };
 

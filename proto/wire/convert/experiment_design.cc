@@ -3,7 +3,6 @@
 #include "core/common/field_error.h"
 #include "core/common/status.h"
 #include "proto/wire/convert/estimate.h"
-#include "proto/wire/convert/expansion_used.h"
 #include "proto/wire/convert/noise.h"
 
 namespace polyest::internal {
@@ -67,7 +66,8 @@ v1::ComputeExperimentDesignResponse::Candidate ToProto(const ExperimentDesign& d
     added.set_time_s(sample.time_s);
     ToProto(sample.gain, *added.mutable_gain());
   }
-  *proto.mutable_expansion() = ToExpansionUsed(design);
+  proto.set_draw_count(design.draws);
+  proto.set_trajectory_count(design.trajectories);
   for (const Diagnostic& diagnostic : design.diagnostics) {
     *proto.add_diagnostics() = ToProto(diagnostic);
   }

@@ -272,7 +272,8 @@ TEST(DesignExperiment, AnswersForTheProblemsOwnInputs) {
   EXPECT_FALSE(own.outputs(1).measured());
   ASSERT_EQ(own.samples_size(), 2);
   EXPECT_EQ(own.samples(0).time_s(), 2);
-  EXPECT_EQ(own.expansion().order(), 3);
+  EXPECT_EQ(own.draw_count(), 64);
+  EXPECT_EQ(own.trajectory_count(), 3 * 64);
 }
 
 TEST(DesignExperiment, PutsTheBestCandidateFirst) {

@@ -10,7 +10,6 @@ from polyest._messages import array
 from polyest._proto.v1 import study_service_pb2
 from polyest._table import Floats
 from polyest.estimate_parts import Diagnostic
-from polyest.results.prior import ExpansionUsed
 
 
 @dataclass(frozen=True)
@@ -53,9 +52,11 @@ class DesignCandidate:
     outputs: dict[str, DesignOutput]
     #: The best times, each the best one to add to those before it, with the gain of all so far.
     samples: list[tuple[float, Gain]]
-    #: The expansion used.
-    expansion: ExpansionUsed
-    #: EXPANSION_INACCURATE (the gains are too small) and POINTS_FAILED, where they apply.
+    #: Draws of the true value over which the gains are averaged.
+    draws: int
+    #: Trajectories integrated for the model's slopes at the draws.
+    trajectories: int
+    #: POINTS_FAILED where trajectories could not be integrated; their draws are left out.
     diagnostics: list[Diagnostic]
 
 
@@ -96,7 +97,7 @@ def _candidate(message: Any) -> DesignCandidate:
                                 _gain(one.alone), _gain(one.together))
          for one in message.outputs},
         [(one.time_s, _gain(one.gain)) for one in message.samples],
-        ExpansionUsed.of_message(message.expansion),
+        message.draw_count, message.trajectory_count,
         [Diagnostic.of_message(one) for one in message.diagnostics])
 
 
