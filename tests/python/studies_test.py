@@ -84,6 +84,8 @@ def test_profiles_have_their_minimum_at_the_estimate(experiment):
         np.testing.assert_allclose(profile.minima[:, column], profile.value, rtol=1e-9)
         assert profile.converged.all()
         assert (profile.total >= profiles.least.total - 1e-6).all()
+    frame = profiles.to_dataframe()
+    assert len(frame) == 42 and list(frame["parameter"].unique()) == ["k", "c"]
 
 
 def test_a_grid_of_costs_adds_up(experiment):
@@ -93,6 +95,10 @@ def test_a_grid_of_costs_adds_up(experiment):
     np.testing.assert_allclose(grid.total[finite], (grid.mismatch + grid.prior)[finite])
     line = experiment.cost_grid(["k"], points=11, held={"c": 0.23})
     assert line.total.shape == (11,)
+    frame = grid.to_dataframe()
+    assert list(frame.columns) == ["c", "k", "mismatch", "prior", "total"]
+    np.testing.assert_array_equal(frame["total"], grid.total.ravel())
+    assert frame["c"].nunique() == 9 and frame["c"][0] == frame["c"][1] == grid.axes[0].value[0]
 
 
 def test_a_sweep_of_regularization_offers_three_rules(experiment):
@@ -100,6 +106,9 @@ def test_a_sweep_of_regularization_offers_three_rules(experiment):
     assert set(sweep.choices) == {"L_CURVE", "DISCREPANCY", "EVIDENCE"}
     weights = [point.regularization for point in sweep.points]
     assert weights == sorted(weights) and sweep.points[0].map.shape == (2,)
+    frame = sweep.to_dataframe()
+    assert list(frame["parameter"][:2]) == ["k", "c"] and list(frame["unit"][:1]) == ["N/m"]
+    assert list(frame["regularization"][::2]) == weights
 
 
 def test_a_propagation_is_the_mean_of_the_prior(client, problem):
@@ -113,6 +122,9 @@ def test_a_propagation_is_the_mean_of_the_prior(client, problem):
     bound = 3 * propagation["x"].residual.max() + 1e-6
     np.testing.assert_allclose(propagation["x"].mean, mean, atol=bound)
     assert propagation["x"].quantiles.shape == (11, 1)
+    frame = propagation.to_dataframe("x")
+    assert list(frame.columns) == ["mean", "std_dev", "q0.5", "residual"]
+    assert frame.index.name == "t" and len(frame) == 11
 
 
 def test_sensitivities_are_shares(client, problem):
@@ -122,6 +134,9 @@ def test_sensitivities_are_shares(client, problem):
     assert (x.total >= x.first_order - 1e-9).all() and (x.total <= 1 + 1e-9).all()
     # The stiffness shifts the phase by far more than the damping changes the amplitude.
     assert next(iter(sensitivity.activity)) == "k"
+    frame = sensitivity.to_dataframe("x")
+    assert list(frame["parameter"][:2]) == ["k", "c"]
+    np.testing.assert_array_equal(frame["total"], x.total.ravel())
 
 
 def test_a_design_ranks_experiments(client):
@@ -136,6 +151,8 @@ def test_a_design_ranks_experiments(client):
         (one.gain.bits for one in design.candidates), reverse=True)
     assert len(design.best.samples) <= 3 and design.best.outputs["a"].noise_std_dev == 1.0
     assert "shove" in design._repr_html_()
+    frame = design.to_dataframe()
+    assert set(frame["candidate"]) == {"push", "shove"} and set(frame["output"]) == {"x", "a"}
 
 
 def test_a_history_of_a_record_narrows(experiment):

@@ -14,6 +14,7 @@ from polyest.estimate_parts import Cost, Diagnostic
 
 if TYPE_CHECKING:
     import numpy.typing as npt
+    import pandas
     from matplotlib.figure import Figure
 
 
@@ -43,6 +44,15 @@ class CostGrid:
     total: Floats
     #: The session's last batch taken into account; 0 without one.
     sequence: int
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """Returns a DataFrame with a row for each point of the grid."""
+        import pandas as pd
+
+        places = np.meshgrid(*(axis.value for axis in self.axes), indexing="ij")
+        columns = {axis.parameter: place.ravel() for axis, place in zip(self.axes, places)}
+        return pd.DataFrame({**columns, "mismatch": self.mismatch.ravel(),
+                             "prior": self.prior.ravel(), "total": self.total.ravel()})
 
     def plot(self) -> Figure:
         """Draws the total cost: a curve or contours. Returns a matplotlib figure."""
@@ -99,6 +109,16 @@ class CostProfiles:
     def __getitem__(self, parameter: str) -> CostProfile:
         """Returns the profile of a parameter. Raises KeyError."""
         return self.profiles[parameter]
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """Returns a DataFrame with a row for each parameter and value."""
+        import pandas as pd
+
+        return pd.concat([
+            pd.DataFrame({"parameter": one.parameter, "value": one.value, "total": one.total,
+                          "mismatch": one.mismatch, "prior": one.prior,
+                          "converged": one.converged})
+            for one in self.profiles.values()], ignore_index=True)
 
     def plot(self) -> Figure:
         """Draws each profile above the least cost. Returns a matplotlib figure."""
@@ -171,6 +191,18 @@ class RegularizationSweep:
     diagnostics: list[Diagnostic]
     #: The session's last batch taken into account; 0 without one.
     sequence: int
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """Returns a DataFrame with a row for each α² and parameter."""
+        import pandas as pd
+
+        return pd.DataFrame([
+            {"regularization": point.regularization, "parameter": name, "unit": unit,
+             "map": float(point.map[i]), "std_dev": float(point.std_dev[i]),
+             "mismatch": point.cost.mismatch, "prior": point.cost.prior,
+             "log_evidence": point.log_evidence, "converged": point.converged}
+            for point in self.points
+            for i, (name, unit) in enumerate(zip(self.parameters, self.units))])
 
     def plot(self) -> Figure:
         """Draws the L-curve: the prior's term over the mismatch. Returns a matplotlib figure."""

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from polyest import _html
 from polyest._messages import array
 from polyest._proto.v1 import study_service_pb2
 from polyest._table import Floats
 from polyest.estimate_parts import Diagnostic
+
+if TYPE_CHECKING:
+    import pandas
 
 
 @dataclass(frozen=True)
@@ -77,6 +80,17 @@ class ExperimentDesign:
     def best(self) -> DesignCandidate:
         """The candidate with the largest gain."""
         return self.candidates[0]
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """Returns a DataFrame with a row for each candidate, output and parameter."""
+        import pandas as pd
+
+        return pd.DataFrame([
+            {"candidate": one.name, "output": output.name, "measured": output.measured,
+             "bits": output.together.bits, "parameter": parameter,
+             "std_dev": float(output.together.std_dev[i])}
+            for one in self.candidates for output in one.outputs.values()
+            for i, parameter in enumerate(self.parameters)])
 
     def _repr_html_(self) -> str:
         rows = [(one.name or "as it is", f"{one.gain.bits:.2f}",

@@ -11,6 +11,7 @@ from polyest._table import Floats
 from polyest.estimate_parts import Diagnostic
 
 if TYPE_CHECKING:
+    import pandas
     from matplotlib.figure import Figure
 
 
@@ -69,6 +70,17 @@ class Propagation:
     def __getitem__(self, output: str) -> PropagationOutput:
         """Returns one output. Raises KeyError."""
         return self.outputs[output]
+
+    def to_dataframe(self, output: str) -> pandas.DataFrame:
+        """Returns one output with a row for each time."""
+        import pandas as pd
+
+        one = self.outputs[output]
+        columns = {"mean": one.mean, "std_dev": one.std_dev,
+                   **{f"q{probability:g}": one.quantiles[:, column]
+                      for column, probability in enumerate(self.probabilities)},
+                   "residual": one.residual}
+        return pd.DataFrame(columns, index=pd.Index(self.time_s, name="t"))
 
     def plot(self) -> Figure:
         """Draws mean and outer quantiles over time. Returns a matplotlib figure."""
@@ -135,6 +147,16 @@ class Sensitivity:
     def __getitem__(self, output: str) -> SensitivityOutput:
         """Returns one output. Raises KeyError."""
         return self.outputs[output]
+
+    def to_dataframe(self, output: str) -> pandas.DataFrame:
+        """Returns one output with a row for each time and parameter."""
+        import pandas as pd
+
+        one = self.outputs[output]
+        return pd.DataFrame({
+            "t": self.time_s.repeat(len(self.parameters)),
+            "parameter": self.parameters * len(self.time_s),
+            "first_order": one.first_order.ravel(), "total": one.total.ravel()})
 
     def plot(self) -> Figure:
         """Draws the total shares over time. Returns a matplotlib figure."""
