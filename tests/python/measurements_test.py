@@ -248,3 +248,10 @@ def test_a_split_record_has_the_same_rows():
     missing = [first + row for first, part in zip((0, 4, 8), parts)
                for row in part.channels[0].missing]
     assert missing == list(whole.channels[0].missing)
+
+
+def test_texts_with_decimal_commas_are_refused_with_what_reads_them():
+    data = {"t": [0.0, 0.1], "x": np.array(["nan", "0,81"], dtype=object)}
+    with pytest.raises(polyest.InvalidInput, match=r"x: row 1 .*'0,81' is a text with a decimal "
+                       r"comma; pandas.read_csv\(…, sep=\";\", decimal=\",\"\)"):
+        converter().convert(data)

@@ -174,3 +174,31 @@ def test_models_are_described(client):
 def test_the_daemon_tells_its_version(client):
     status = client.status()
     assert status.version and status.memory_bytes > 0 and status.uptime_s >= 0
+
+
+@pytest.mark.parametrize(("call", "argument", "said"), [
+    (lambda one: one.predict(draws=2.5), "draws", "2.5 of the type float must be a whole number"),
+    (lambda one: one.predict(outputs=5), "outputs", "5 of the type int must be a list, of which "),
+    (lambda one: one.predict(times="now"), "times", "'now' of the type str must be numbers"),
+    (lambda one: one.predict(horizon_s="1 s"), "horizon_s", "must be a number"),
+    (lambda one: one.posterior(samples="10"), "samples", "must be a whole number below 2^31"),
+    (lambda one: one.posterior(samples=2**40), "samples", "must be a whole number below 2^31"),
+    (lambda one: one.posterior(joints=[("k",)]), "joints", "must be a pair of names"),
+    (lambda one: one.posterior(probabilities=0.5), "probabilities", "must be a list, of which "),
+    (lambda one: one.profiles(points=None, parameters=[1]), "parameters", "each is a text"),
+    (lambda one: one.cost_grid(held={"c": "big"}), "held", "must be a dict of numbers"),
+    (lambda one: one.cost_grid(held=5), "held", "must be a dict of numbers"),
+    (lambda one: one.propagate("1", 0.1), "until_s", "must be a number"),
+    (lambda one: one.design(1.0, candidates=["push"]), "candidates", "must be a dict"),
+    (lambda one: one.design(1.0, outputs={"a": "loud"}), "outputs.a", "must be a number"),
+    (lambda one: one.history("all"), "points", "must be a whole number"),
+])
+def test_an_argument_of_a_wrong_type_is_named(experiment, call, argument, said):
+    with pytest.raises(polyest.InvalidInput) as raised:
+        call(experiment)
+    assert isinstance(raised.value, TypeError) and raised.value.field == argument
+    assert raised.value.message.startswith(f"{argument}: ") and said in raised.value.message
+
+
+def test_one_name_stands_for_a_list_of_it(experiment):
+    assert list(experiment.profiles("k", points=5).profiles) == ["k"]

@@ -37,6 +37,7 @@ from polyest.errors import (
     Unauthenticated,
     Unavailable,
     Unimplemented,
+    WrongType,
 )
 from polyest.estimate_parts import (
     ChannelEstimate,
@@ -68,6 +69,6 @@ __all__ = [
     "MixtureComponent", "Model", "Noise", "Normal", "NotFound", "Parameter", "PermissionDenied",
     "PolyestError", "Problem", "Quantity", "Remark", "ResourceExhausted", "Samples", "Session",
     "SessionInfo", "Sinusoid", "Step", "StreamOptions", "Streamed", "TradeOff", "TruncatedNormal",
-    "Unauthenticated", "Unavailable", "Uniform", "Unimplemented", "WindowEstimate", "aio",
-    "connect", "datatree", "estimate", "io", "local", "plot", "results",
+    "Unauthenticated", "Unavailable", "Uniform", "Unimplemented", "WindowEstimate",
+    "WrongType", "aio", "connect", "datatree", "estimate", "io", "local", "plot", "results",
 ]

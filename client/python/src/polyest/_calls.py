@@ -5,7 +5,7 @@ Synchronous and asynchronous clients run the same calls.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Generic, Optional, TypeVar
 
@@ -21,6 +21,7 @@ from polyest._proto.v1 import (
     session_service_pb2,
     study_service_pb2,
 )
+from polyest._request import make, wrong
 from polyest.results import cost, design, history, posterior, prediction, prior
 from polyest.signals import Signal
 
@@ -65,8 +66,8 @@ def compute_estimate(subject: Subject, source: Optional[Studies]) -> Call[estima
 def compute_history(subject: Subject, points: int) -> Call[results.History]:
     """How the estimate of an experiment comes about."""
     return Call(_methods.COMPUTE_ESTIMATE,
-                study_service_pb2.ComputeEstimateRequest(subject=subject,
-                                                         history_point_count=points),
+                make(study_service_pb2.ComputeEstimateRequest, subject=subject,
+                     history_point_count=points),
                 lambda answer: history.of_message(answer.history))
 
 
@@ -96,12 +97,13 @@ def predict(subject: Subject, *, outputs: Sequence[str], probabilities: Sequence
             horizon_s: float, smoothed: bool, forecast_s: float, first_scored_row: int,
             record: Optional[measurements_pb2.Measurements]) -> Call[results.Prediction]:
     """The outputs over time as the posterior predicts them."""
-    request = study_service_pb2.PredictRequest(
-        subject=subject, outputs=outputs, probabilities=probabilities, draw_count=draws,
-        max_row_count=max_rows, lag_count=lags, horizon_s=horizon_s, smoothed=smoothed,
-        forecast_s=forecast_s, first_scored_row=first_scored_row, record=record)
+    request = make(
+        study_service_pb2.PredictRequest, subject=subject, outputs=outputs,
+        probabilities=probabilities, draw_count=draws, max_row_count=max_rows,
+        lag_count=lags, horizon_s=horizon_s, smoothed=smoothed, forecast_s=forecast_s,
+        first_scored_row=first_scored_row, record=record)
     if times is not None:
-        for time_s in np.asarray(times, dtype=float).ravel():
+        for time_s in _numbers("times", times):
             request.times.add(run=run, time_s=time_s)
     return Call(_methods.PREDICT, request, prediction.of_message)
 
@@ -122,11 +124,16 @@ def compute_posterior(subject: Subject, *, probabilities: Sequence[float], densi
                       joints: Sequence[tuple[str, str]], all_joints: bool, joint_bins: int,
                       samples: int) -> Call[results.Posterior]:
     """The posterior in detail."""
-    request = study_service_pb2.ComputePosteriorRequest(
-        subject=subject, probabilities=probabilities, density_bin_count=density_bins,
-        joint_bin_count=joint_bins, sample_count=samples, all_joints=all_joints)
-    for first, second in joints:
-        request.joints.add(first=first, second=second)
+    request = make(
+        study_service_pb2.ComputePosteriorRequest, subject=subject,
+        probabilities=probabilities, density_bin_count=density_bins, joint_bin_count=joint_bins,
+        sample_count=samples, all_joints=all_joints)
+    pair: Any
+    for pair in joints:
+        if isinstance(pair, str) or not isinstance(pair, Sequence) or len(pair) != 2:
+            raise wrong("joints", pair, 'a pair of names, as in ("k", "c")')
+        request.joints.append(make(study_service_pb2.ComputePosteriorRequest.ParameterPair,
+                                   first=pair[0], second=pair[1]))
     return Call(_methods.COMPUTE_POSTERIOR, request, posterior.of_message)
 
 
@@ -134,8 +141,8 @@ def compute_profiles(subject: Subject, *, parameters: Sequence[str],
                      points: int) -> Call[results.CostProfiles]:
     """The cost over each parameter."""
     return Call(_methods.COMPUTE_COST_PROFILES,
-                study_service_pb2.ComputeCostProfilesRequest(
-                    subject=subject, parameters=parameters, point_count=points),
+                make(study_service_pb2.ComputeCostProfilesRequest,
+                     subject=subject, parameters=parameters, point_count=points),
                 cost.profiles_of)
 
 
@@ -143,8 +150,8 @@ def compute_cost_grid(subject: Subject, *, parameters: Sequence[str], points: in
                       held: Mapping[str, float]) -> Call[results.CostGrid]:
     """The cost on a grid."""
     return Call(_methods.COMPUTE_COST_GRID,
-                study_service_pb2.ComputeCostGridRequest(
-                    subject=subject, parameters=parameters, point_count=points, held=dict(held)),
+                make(study_service_pb2.ComputeCostGridRequest,
+                     subject=subject, parameters=parameters, point_count=points, held=held),
                 cost.grid_of)
 
 
@@ -152,8 +159,8 @@ def compute_sweep(subject: Subject, *, lowest: float, highest: float,
                   points: int) -> Call[results.RegularizationSweep]:
     """The estimates over the weight of the prior."""
     return Call(_methods.COMPUTE_REGULARIZATION_SWEEP,
-                study_service_pb2.ComputeRegularizationSweepRequest(
-                    subject=subject, lowest=lowest, highest=highest, point_count=points),
+                make(study_service_pb2.ComputeRegularizationSweepRequest,
+                     subject=subject, lowest=lowest, highest=highest, point_count=points),
                 cost.sweep_of)
 
 
@@ -162,9 +169,9 @@ def compute_propagation(subject: Subject, *, until_s: float, step_s: float,
                         density_bins: int) -> Call[results.Propagation]:
     """What the prior predicts."""
     return Call(_methods.COMPUTE_PROPAGATION,
-                study_service_pb2.ComputePropagationRequest(
-                    subject=subject, until_s=until_s, step_s=step_s, outputs=outputs,
-                    probabilities=probabilities, density_bin_count=density_bins),
+                make(study_service_pb2.ComputePropagationRequest,
+                     subject=subject, until_s=until_s, step_s=step_s, outputs=outputs,
+                     probabilities=probabilities, density_bin_count=density_bins),
                 prior.propagation_of)
 
 
@@ -172,8 +179,8 @@ def compute_sensitivity(subject: Subject, *, until_s: float, step_s: float,
                         outputs: Sequence[str]) -> Call[results.Sensitivity]:
     """Which parameters the outputs depend on."""
     return Call(_methods.COMPUTE_SENSITIVITY,
-                study_service_pb2.ComputeSensitivityRequest(
-                    subject=subject, until_s=until_s, step_s=step_s, outputs=outputs),
+                make(study_service_pb2.ComputeSensitivityRequest,
+                     subject=subject, until_s=until_s, step_s=step_s, outputs=outputs),
                 prior.sensitivity_of)
 
 
@@ -181,15 +188,36 @@ def compute_design(subject: Subject, *, until_s: float, step_s: float, samples: 
                    candidates: Candidates,
                    outputs: Mapping[str, float]) -> Call[results.ExperimentDesign]:
     """What a next experiment would tell."""
-    request = study_service_pb2.ComputeExperimentDesignRequest(
-        subject=subject, until_s=until_s, step_s=step_s, sample_count=samples)
-    for name, inputs in candidates.items():
+    request = make(
+        study_service_pb2.ComputeExperimentDesignRequest, subject=subject, until_s=until_s,
+        step_s=step_s, sample_count=samples)
+    for name, inputs in _entries("candidates", candidates, "inputs by name"):
         candidate = request.candidates.add(name=name)
-        for signal_name, signal in inputs.items():
+        for signal_name, signal in _entries(f"candidates.{name}", inputs, "signals by input"):
             candidate.inputs.append(input_of(signal_name, signal))
-    for output, noise in outputs.items():
-        request.possible.add(output=output).noise.absolute = noise
+    for output, noise in _entries("outputs", outputs, "noise by output"):
+        request.possible.add(output=output).noise.absolute = _number(f"outputs.{output}", noise)
     return Call(_methods.COMPUTE_EXPERIMENT_DESIGN, request, design.of_message)
+
+
+def _numbers(argument: str, values: npt.ArrayLike) -> Any:
+    try:
+        return np.asarray(values, dtype=float).ravel()
+    except (TypeError, ValueError):
+        raise wrong(argument, values, "numbers") from None
+
+
+def _number(argument: str, value: Any) -> float:
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        raise wrong(argument, value, "a number") from None
+
+
+def _entries(argument: str, value: Any, what: str) -> Iterable[tuple[str, Any]]:
+    if isinstance(value, Mapping):
+        return value.items()
+    raise wrong(argument, value, f"a dict, {what}")
 
 
 def input_of(name: str, signal: Signal) -> problem_pb2.Input:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import re
 from collections.abc import Mapping
 from typing import Any, Optional, Union
 
@@ -18,6 +19,8 @@ Integers = npt.NDArray[np.int64]
 #: Data as the package takes them: a pandas DataFrame, a mapping from names to columns, or a
 #: structured numpy array.
 Data = Union[Mapping[str, npt.ArrayLike], Array, Any]
+
+_DECIMAL_COMMA = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?")
 
 # Seconds in each unit of time.
 _SECONDS = {"": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6, "ns": 1e-9,
@@ -129,12 +132,21 @@ def floats(name: str, values: Array) -> Floats:
     if values.dtype.kind == "O":
         values = _array(name, [np.nan if value is None else value for value in values])
     if values.dtype.kind not in "fiub":
+        _refuse_decimal_comma(name, values)
         raise refuse(name, f"has values of type {values.dtype}; it must have numbers")
     numbers: Floats = values.astype(np.float64)
     infinite = np.flatnonzero(np.isinf(numbers))
     if infinite.size:
         raise refuse(name, f"{row_text(int(infinite[0]))}: {numbers[infinite[0]]} is not finite")
     return numbers
+
+
+def _refuse_decimal_comma(name: str, values: Array) -> None:
+    """Raises InvalidInput for texts such as "1,5", which pandas leaves where it is not told."""
+    for row, value in enumerate(values):
+        if isinstance(value, str) and _DECIMAL_COMMA.fullmatch(value.strip()):
+            raise refuse(name, f"{row_text(row)}: '{value}' is a text with a decimal comma; "
+                         "pandas.read_csv(…, sep=\";\", decimal=\",\") reads such files")
 
 
 class Clock:

@@ -125,8 +125,8 @@ class Client:
         units: of columns by the problem's names, as in {"x": "mm", "t": "ms"}; by default those in
             the headers ("x [mm]") or the problem's `columns`, else the model's.
 
-        Raises InvalidInput, with the field and the rule, and any other `PolyestError`; TypeError
-        for what is no problem.
+        Raises InvalidInput, with the field and the rule, and any other `PolyestError`;
+        WrongType for what is no problem.
         """
         return self.experiment(problem, data, units=units).estimate()
 

@@ -17,7 +17,7 @@ from polyest._proto.rpc import error_details_pb2 as rpc
 __all__ = [
     "Aborted", "AlreadyExists", "Cancelled", "DataLoss", "DeadlineExceeded", "FailedPrecondition",
     "InternalError", "InvalidInput", "NotFound", "PermissionDenied", "PolyestError",
-    "ResourceExhausted", "Unauthenticated", "Unavailable", "Unimplemented",
+    "ResourceExhausted", "Unauthenticated", "Unavailable", "Unimplemented", "WrongType",
 ]
 
 _DETAILS = "grpc-status-details-bin"
@@ -65,6 +65,10 @@ class InvalidInput(PolyestError, ValueError):
     """A field of a problem, of measurements or of an option is wrong: `field` and `rule`."""
 
     code = "INVALID_ARGUMENT"
+
+
+class WrongType(InvalidInput, TypeError):
+    """An argument is of a type that it cannot have: `field` is its name."""
 
 
 class NotFound(PolyestError, LookupError):

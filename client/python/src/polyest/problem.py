@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any, Literal, Optional, Union
 import numpy as np
 from google.protobuf import json_format
 
-from polyest import _strict_json
+from polyest import _strict_json, _wrong_values
 from polyest._proto.v1 import problem_pb2
-from polyest.errors import InvalidInput
+from polyest._request import wrong
+from polyest.errors import InvalidInput, WrongType
 from polyest.noise import Noise
 from polyest.priors import Prior
 from polyest.signals import Interpolation, Signal, Streamed
@@ -102,7 +103,8 @@ class Problem:
         `drift` makes it a random walk: its rate in the quantity's unit/√s, or the bounds of an
         unknown rate, which is then estimated, too.
         """
-        entry: dict[str, Any] = {"name": name, **prior.as_json()}
+        known = _json_of("prior", prior, "a prior, such as polyest.Uniform(1, 2)")
+        entry: dict[str, Any] = {"name": name, **known}
         if per_run:
             entry["perRun"] = True
         if population:
@@ -143,7 +145,8 @@ class Problem:
 
     def drive(self, name: str, signal: Signal) -> Problem:
         """Says how an input of the model runs over time."""
-        self._document.setdefault("inputs", []).append({"name": name, **signal.as_json()})
+        self._document.setdefault("inputs", []).append(
+            {"name": name, **_json_of("signal", signal, "a signal, such as polyest.Step(1.0)")})
         return self
 
     def stream(self, name: str, *, hold: bool = False,
@@ -161,7 +164,7 @@ class Problem:
         `noise` is the standard deviation of its samples in the output's unit, or a `Noise`.
         `column` and `unit` name the column of the data that has it, and that column's unit.
         """
-        sizes = noise if isinstance(noise, Noise) else Noise(absolute=float(noise))
+        sizes = noise if isinstance(noise, Noise) else Noise(absolute=_number("noise", noise))
         self._document.setdefault("measured", []).append(
             {"output": output, "noise": sizes.as_json()})
         return self.column(output, column, unit) if column or unit else self
@@ -202,7 +205,7 @@ class Problem:
         if isinstance(weight, str):
             self._document["regularizationMode"] = weight
         else:
-            self._document["regularization"] = float(weight)
+            self._document["regularization"] = _number("weight", weight)
         return self
 
     def _merge(self, member: str, **values: Any) -> None:
@@ -253,7 +256,23 @@ def _plain(value: Any) -> Any:
     """Returns a number or an array of numpy as JSON has it."""
     if isinstance(value, (np.generic, np.ndarray)):
         return value.tolist()
-    raise TypeError(f"{value!r} of the type {type(value).__name__} is nothing that JSON has")
+    raise WrongType(f"{value!r} of the type {type(value).__name__} is nothing that JSON has",
+                    field="problem")
+
+
+def _json_of(argument: str, value: Any, what: str) -> dict[str, Any]:
+    """Returns the JSON object of a prior or a signal. Raises WrongType for anything else."""
+    if isinstance(value, type) or not hasattr(value, "as_json"):
+        raise wrong(argument, value, what)
+    found: dict[str, Any] = value.as_json()
+    return found
+
+
+def _number(argument: str, value: Any) -> float:
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        raise wrong(argument, value, "a number") from None
 
 
 #: A problem: built, as a problem file's JSON object, or the path of a problem file.
@@ -280,9 +299,9 @@ def _refusal(sentence: str) -> tuple[str, str]:
 def _read(path: Union[str, os.PathLike[str]]) -> dict[str, Any]:
     # `open` takes a number for a descriptor, perhaps a connection's, and closes it in the end.
     if not isinstance(path, (str, os.PathLike)):
-        raise TypeError("a problem must be a polyest.Problem, a dict, or the path of a problem "
+        raise WrongType("a problem must be a polyest.Problem, a dict, or the path of a problem "
                         f"file (str or os.PathLike); got {path!r} of the type "
-                        f"{type(path).__name__}")
+                        f"{type(path).__name__}", field="problem")
     try:
         with open(path, encoding="utf-8-sig") as file:
             document = _strict_json.loads(file.read())
@@ -321,6 +340,11 @@ def to_message(problem: ProblemLike) -> problem_pb2.Problem:
     try:
         json_format.ParseDict(document, message)
     except json_format.ParseError as error:
+        if _UNKNOWN.search(str(error)) is None:
+            wrong_value = _wrong_values.find(document, problem_pb2.Problem.DESCRIPTOR)
+            if wrong_value is not None:
+                field, rule = wrong_value
+                raise InvalidInput(f"{place}{field}: {rule}", field=field, rule=rule) from error
         field, rule = _refusal(str(error))
         raise InvalidInput(f"{place}{error}", field=field, rule=rule) from error
     return message
