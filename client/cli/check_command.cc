@@ -8,6 +8,7 @@
 #include "client/cli/backend.h"
 #include "client/cli/commands.h"
 #include "client/cli/data_input.h"
+#include "client/cli/data_warnings.h"
 #include "client/cli/exit_status.h"
 #include "client/cli/input_files.h"
 #include "client/cli/problem_input.h"
@@ -15,12 +16,9 @@
 #include "client/cli/text_table.h"
 #include "core/common/check.h"
 #include "core/common/status.h"
-#include "core/estimator/record/sample_checks.h"
 #include "polyest/data_file.h"
 #include "polyest/problem_file.h"
-#include "proto/wire/check/data_summary.h"
 #include "proto/wire/check/problem_summary.h"
-#include "proto/wire/convert/measurements.h"
 #include "proto/wire/convert/problem.h"
 #include "proto/wire/convert/wire_fields.h"
 #include "proto/wire/json/json_format.h"
@@ -78,9 +76,7 @@ void Print(const Remarks& remarks, std::ostream& out) {
 
 absl::Status CheckRecord(const ResolvedProblem& problem, const v1::Measurements& data,
                          Findings& findings, std::ostream& out) {
-  POLYEST_ASSIGN_OR_RETURN(const Samples samples, ToSamples(data, *problem.problem().model));
-  POLYEST_ASSIGN_OR_RETURN(const CheckedSamples checked, SampleChecks(problem).Check(samples));
-  DataSummary record = Summarize(problem, checked);
+  POLYEST_ASSIGN_OR_RETURN(DataSummary record, SummarizeRecord(problem, data));
   out << "\ndata: " << record.rows << '\n';
   for (const std::string& channel : record.channels) out << "  " << channel << '\n';
   for (std::string& warning : record.warnings) findings.warnings.push_back(std::move(warning));
@@ -164,9 +160,7 @@ int RunCommand(const CheckArguments& arguments, std::ostream& out, std::ostream&
     out << AsJson(findings) << '\n';
   } else if (ok) {
     out << findings.summary;
-    for (const std::string& warning : findings.warnings) {
-      out << Paint(out, Color::kYellow, "warning:") << ' ' << warning << '\n';
-    }
+    PrintWarnings(findings.warnings, out);
   }
   if (ok) return kExitOk;
   for (const std::string& error : findings.errors) {

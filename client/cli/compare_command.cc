@@ -26,11 +26,11 @@ struct Contestant : Assessment {
 };
 
 absl::StatusOr<Contestant> Assess(const std::string& file, const CompareArguments& arguments,
-                                  Backend& backend) {
+                                  Backend& backend, DataWarnings& warnings) {
   v1::Experiment experiment;
   POLYEST_ASSIGN_OR_RETURN(InputFiles files,
                            ReadProblemAndData(file, arguments.files.back(), arguments.place,
-                                              experiment, arguments.data_options));
+                                              experiment, arguments.data_options, warnings));
   files.record = files.data;  // some rows of which are held out
   auto weighed = Weigh(experiment, backend);
   if (!weighed.ok()) return InFiles(weighed.status(), files);
@@ -44,7 +44,7 @@ absl::StatusOr<std::vector<Contestant>> Compare(const CompareArguments& argument
   const auto backend = MakeBackend(arguments.place);
   std::vector<Contestant> all;
   for (auto file = arguments.files.begin(); file + 1 != arguments.files.end(); ++file) {
-    POLYEST_ASSIGN_OR_RETURN(Contestant one, Assess(*file, arguments, *backend));
+    POLYEST_ASSIGN_OR_RETURN(Contestant one, Assess(*file, arguments, *backend, warnings));
     all.push_back(std::move(one));
     const Contestant& first = all.front();
     const Contestant& last = all.back();
@@ -58,6 +58,7 @@ absl::StatusOr<std::vector<Contestant>> Compare(const CompareArguments& argument
       all, [&](const Contestant& one) { return HaveComparableEvidence(one, all.front()); });
   if (!comparable) {
     for (Contestant& one : all) one.log_evidence.reset();
+  DataWarnings warnings;
   }
   std::ranges::stable_sort(all, std::greater(), [](const Contestant& one) {
     return one.log_evidence.value_or(one.log_score);

@@ -124,9 +124,10 @@ absl::StatusOr<ExplainInput> ReadExplainInput(const ExplainArguments& arguments,
   v1::ComputeEstimateRequest request;
   v1::Experiment& experiment = *request.mutable_subject()->mutable_experiment();
   ExplainInput input;
+  DataWarnings warnings;
   POLYEST_ASSIGN_OR_RETURN(
       input.files, ReadProblemAndData(arguments.problem_file, arguments.data_file, arguments.place,
-                                      experiment, arguments.data_options));
+                                      experiment, arguments.data_options, warnings));
   auto response = backend.ComputeEstimate(request);
   if (!response.ok()) return InFiles(response.status(), input.files);
   input.problem = std::move(*experiment.mutable_problem());

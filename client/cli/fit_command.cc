@@ -11,6 +11,7 @@
 #include "client/cli/backend.h"
 #include "client/cli/commands.h"
 #include "client/cli/csv_field.h"
+#include "client/cli/data_warnings.h"
 #include "client/cli/estimate_format.h"
 #include "client/cli/fit_plot.h"
 #include "client/cli/input_files.h"
@@ -37,6 +38,7 @@ absl::StatusOr<v1::PredictResponse> Fit(const FitArguments& arguments) {
                              DataColumnsFor(problem, arguments.place, arguments.data_options));
     POLYEST_ASSIGN_OR_RETURN(*request.mutable_record(),
                              ReadData(arguments.validation_file, columns, files.record));
+    DataWarnings().Print(problem, arguments.place, request.record(), arguments.validation_file);
   }
   request.mutable_outputs()->Add(arguments.outputs.begin(), arguments.outputs.end());
   request.mutable_probabilities()->Add(arguments.probabilities.begin(),

@@ -35,7 +35,8 @@ absl::Status CheckFilesAreNotSwapped(const std::string& problem_file,
 absl::StatusOr<InputFiles> ReadProblemAndData(const std::string& problem_file,
                                               const std::string& data_file, const Place& place,
                                               v1::Experiment& experiment,
-                                              const DataFileOptions& options) {
+                                              const DataFileOptions& options,
+                                              DataWarnings& warnings) {
   POLYEST_RETURN_IF_ERROR(CheckFilesAreNotSwapped(problem_file, data_file));
   InputFiles files{.problem = problem_file};
   v1::Problem& problem = *experiment.mutable_problem();
@@ -43,6 +44,7 @@ absl::StatusOr<InputFiles> ReadProblemAndData(const std::string& problem_file,
   POLYEST_ASSIGN_OR_RETURN(const DataColumns columns, DataColumnsFor(problem, place, options));
   POLYEST_ASSIGN_OR_RETURN(*experiment.mutable_measurements(),
                            ReadData(data_file, columns, files.data));
+  warnings.Print(problem, place, experiment.measurements());
   return files;
 }
 

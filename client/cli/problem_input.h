@@ -11,6 +11,7 @@
 
 #include "client/cli/arguments.h"
 #include "client/cli/data_input.h"
+#include "client/cli/data_warnings.h"
 #include "client/cli/input_files.h"
 #include "core/common/status.h"
 #include "polyest/v1/problem.pb.h"
@@ -26,11 +27,13 @@ absl::StatusOr<v1::Problem> ReadCheckedProblem(const std::string& path, const Pl
 // Refuses two files with INVALID_ARGUMENT when the first is CSV data and the second a problem.
 absl::Status CheckFilesAreNotSwapped(const std::string& problem_file, const std::string& data_file);
 
-// Reads a checked problem and the data for it. Returns their files.
+// Reads a checked problem and the data for it, and warns of data that are probably not what was
+// meant. Returns their files.
 absl::StatusOr<InputFiles> ReadProblemAndData(const std::string& problem_file,
                                               const std::string& data_file, const Place& place,
                                               v1::Experiment& experiment,
-                                              const DataFileOptions& options = {});
+                                              const DataFileOptions& options,
+                                              DataWarnings& warnings);
 
 // Returns what the arguments say about the data file; the defaults if their command says nothing.
 template <typename Arguments>
@@ -49,9 +52,10 @@ absl::StatusOr<InputFiles> FillInput(const Arguments& arguments, Request& reques
       return InputFiles();
     }
   }
+  DataWarnings warnings;
   return ReadProblemAndData(arguments.problem_file, arguments.data_file, arguments.place,
                             *request.mutable_subject()->mutable_experiment(),
-                            DataOptionsOf(arguments));
+                            DataOptionsOf(arguments), warnings);
 }
 
 // Returns the problem of a subject that FillInput has filled in; asks the daemon for a session's.

@@ -4,6 +4,8 @@
 #include <gmock/gmock.h>
 #include <google/protobuf/struct.pb.h>
 
+#include <cmath>
+
 #include "tests/integration/cli/command_test.h"
 
 namespace polyest::internal {
@@ -15,6 +17,7 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
 using ::testing::SizeIs;
+using ::testing::StartsWith;
 
 constexpr char kProblem[] = R"({
   "model": {"builtin": "mass_spring_damper"},
@@ -120,6 +123,27 @@ TEST_F(CheckTest, WarnsOfDataThatDeserveASecondLook) {
               HasSubstr("noise of 0.01 is larger than the spread of its samples"));
   EXPECT_THAT(Warnings("t,x,force\n0,0,0\n0.1,10,1\n0.2,-10,0\n0.3,20,2\n"),
               HasSubstr("noise of at most 0.01 is less than the rounding of its samples, 2.9"));
+}
+
+TEST_F(CheckTest, WarnsAsCommandsDoBeforeTheyCompute) {
+  const std::string problem = File("p.json", kProblem);
+  std::string rows = "t,x,force\n";  // in mm, which no unit says
+  for (int i = 0; i < 40; ++i) {
+    absl::StrAppend(&rows, 0.05 * i, ",", 1000 * std::cos(0.3 * i), ",", i % 3, "\n");
+  }
+  const std::string data = File("d.csv", rows);
+  const std::string warnings = Warnings(rows);
+  ASSERT_THAT(warnings, HasSubstr("check the unit of x"));
+  EXPECT_EQ(Run({"estimate", problem, data}).err, warnings);
+  const DaemonProcess daemon;
+  EXPECT_EQ(Run({"estimate", problem, data, "--server", daemon.address()}).err, warnings);
+  // What is validated is warned of by the name of its file, and what problems share once.
+  const std::string other = File("o.csv", "t,x,force\n0,1,5\n0.1,0.8,5\n0.2,0.3,5\n");
+  EXPECT_THAT(
+      Run({"fit", problem, data, "--validate", other}).err,
+      AllOf(StartsWith(warnings),
+            HasSubstr("warning: " + other + ": force never changes: it is 5 in every row")));
+  EXPECT_EQ(Run({"compare", problem, problem, data}).err, warnings);
 }
 
 TEST_F(CheckTest, WarnsOfNoiseThatVanishesWithTheSignal) {
