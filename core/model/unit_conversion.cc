@@ -2,7 +2,9 @@
 
 #include <absl/strings/str_format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <string>
 
 #include "core/common/status.h"
@@ -23,15 +25,24 @@ constexpr Spelling kSpellings[] = {
     {"seconds", "s"},    {"Sekunden", "s"}, {"msec", "ms"},     {"milliseconds", "ms"},
     {"usec", "us"},      {"degree", "deg"}, {"degrees", "deg"}, {"Grad", "deg"},
     {"U/min", "1/min"},  {"kph", "km/h"},   {"kmh", "km/h"},    {"deg/sec", "deg/s"},
-    {"Grad/s", "deg/s"}, {"s-1", "1/s"},    {"min-1", "1/min"}, {"s⁻¹", "1/s"},
-    {"min⁻¹", "1/min"},  {"Nm", "N m"},     {"kNm", "kN m"},    {"Nmm", "N mm"},
-    {"Ns/m", "N s/m"},
+    {"Grad/s", "deg/s"}, {"Nm", "N m"},     {"kNm", "kN m"},    {"Nmm", "N mm"},
+    {"Ns/m", "N s/m"},   {"inch", "in"},    {"inches", "in"},   {"feet", "ft"},
+    {"lbs", "lb"},
 };
+
+// Spellings of temperatures in degrees Celsius, whose steps are those of K.
+constexpr std::string_view kCelsius[] = {"°C", "℃", "deg C", "degC", "° C", "Celsius"};
+constexpr double kZeroCelsius = 273.15;  // K
 
 // Spellings of accelerations in standard gravity, which are masses otherwise.
 constexpr Spelling kGravities[] = {{"g", "gn"}, {"mg", "mgn"}, {"µg", "µgn"}, {"ug", "ugn"}};
 
+bool IsCelsius(std::string_view recorded) {
+  return std::find(std::begin(kCelsius), std::end(kCelsius), recorded) != std::end(kCelsius);
+}
+
 std::string_view UnitOf(std::string_view recorded) {
+  if (IsCelsius(recorded)) return "K";
   for (const Spelling& spelling : kSpellings) {
     if (spelling.recorded == recorded) return spelling.unit;
   }
@@ -72,10 +83,10 @@ UnitConversion ByScale(double scale) {
   const double inverse = 1 / scale;
   const double whole = std::round(inverse);
   if (scale < 1 && whole < 1e15 && std::abs(inverse - whole) <= kRounding * whole) {
-    return {1, whole};
+    return {.divisor = whole};
   }
   const bool is_whole = std::abs(scale - std::round(scale)) <= kRounding * scale;
-  return {is_whole ? std::round(scale) : scale, 1};
+  return {.multiplier = is_whole ? std::round(scale) : scale};
 }
 
 }  // namespace
@@ -105,7 +116,9 @@ absl::StatusOr<UnitConversion> ConvertUnit(std::string_view recorded, std::strin
   if (IsPerMinute(model_text, to) && IsAngularVelocity(text, from)) {
     return differ("one counts cycles, the other angles");
   }
-  return ByScale(from.scale / to.scale);
+  UnitConversion conversion = ByScale(from.scale / to.scale);
+  if (IsCelsius(recorded) && !IsCelsius(model)) conversion.offset = kZeroCelsius / to.scale;
+  return conversion;
 }
 
 }  // namespace polyest::internal

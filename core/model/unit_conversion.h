@@ -3,8 +3,9 @@
 // Converts recorded values into a model's unit.
 //
 // A recorded unit is written as in core/model/units.h, or as files of measurements write it: "-"
-// for a plain number, "sec", "Grad", "U/min", "min-1"; "g" is standard gravity where the model has
-// an acceleration, and "1/min" is rpm where the model has an angular velocity.
+// for a plain number, "sec", "inch", "Grad", "U/min"; "g" is standard gravity where the model has
+// an acceleration, and "1/min" is rpm where the model has an angular velocity. "°C", "deg C" and
+// "degC" are temperatures, 273.15 K above those in K.
 
 #include <absl/status/statusor.h>
 
@@ -12,14 +13,16 @@
 
 namespace polyest::internal {
 
-// value in the model's unit = recorded value · multiplier / divisor. One of the two is 1. A divisor
-// is a whole number, so that 12 mm become the double nearest to 0.012 m.
+// value in the model's unit = recorded value · multiplier / divisor + offset. The multiplier or the
+// divisor is 1. A divisor is a whole number, so that 12 mm become the double nearest to 0.012 m.
+// Only temperatures have an offset.
 struct UnitConversion {
   double multiplier = 1;
   double divisor = 1;
+  double offset = 0;
 
-  bool IsIdentity() const { return multiplier == 1 && divisor == 1; }
-  double operator()(double recorded) const { return recorded * multiplier / divisor; }
+  bool IsIdentity() const { return multiplier == 1 && divisor == 1 && offset == 0; }
+  double operator()(double recorded) const { return recorded * multiplier / divisor + offset; }
 };
 
 // Checks that text is a unit that files of measurements write. InvalidArgument states the error.

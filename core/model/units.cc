@@ -130,6 +130,7 @@ class UnitParser {
   absl::StatusOr<Unit> Factor(int groups);
   absl::StatusOr<Unit> SymbolOrNumber();
   absl::StatusOr<double> Exponent();
+  std::optional<double> PlainExponent(size_t at) const;
   std::optional<double> Number();
 
   std::string_view text_;
@@ -167,12 +168,36 @@ absl::StatusOr<Unit> UnitParser::Factor(int groups) {
 absl::StatusOr<double> UnitParser::Exponent() {
   if (Take("²")) return 2;
   if (Take("³")) return 3;
+  if (Take("⁻¹")) return -1;
+  if (Take("⁻²")) return -2;
+  if (Take("⁻³")) return -3;
+  if (const std::optional<double> exponent = PlainExponent(at_)) {
+    at_ += *exponent < 0 ? 2 : 1;
+    return *exponent;
+  }
   if (!Take("^") && !Take("**")) return 1;
   const std::optional<double> exponent = Number();
   if (!exponent || std::abs(*exponent) > kMaxPower) {
     return Error("has a ^ without a number between -100 and 100 after it");
   }
   return *exponent;
+}
+
+// Returns the exponent of the symbol or group that ends at a place, if it is written without ^: one
+// digit, as in m/s2 or s-1. An exponent of 1 is not written; x1 is rather a name.
+std::optional<double> UnitParser::PlainExponent(size_t at) const {
+  const auto is_digit = [this](size_t i) {
+    return i < text_.size() && text_[i] >= '0' && text_[i] <= '9';
+  };
+  const bool negative = at > 0 && at < text_.size() && text_[at] == '-';
+  const size_t digit = negative ? at + 1 : at;
+  if (at == 0 || is_digit(at - 1) || !is_digit(digit)) return std::nullopt;
+  const bool ends = digit + 1 == text_.size() ||
+                    std::string_view(" \t*/)").find(text_[digit + 1]) != text_.npos ||
+                    text_.substr(digit + 1).starts_with("·");
+  const int power = text_[digit] - '0';
+  if (!ends || power < (negative ? 1 : 2)) return std::nullopt;
+  return negative ? -power : power;
 }
 
 std::optional<double> UnitParser::Number() {
@@ -194,7 +219,8 @@ absl::StatusOr<Unit> UnitParser::SymbolOrNumber() {
   size_t end = at_;
   while (end < text_.size() && std::string_view(" \t*/^()").find(text_[end]) == text_.npos &&
          !text_.substr(end).starts_with("·") && !text_.substr(end).starts_with("²") &&
-         !text_.substr(end).starts_with("³")) {
+         !text_.substr(end).starts_with("³") && !text_.substr(end).starts_with("⁻") &&
+         !PlainExponent(end)) {
     ++end;
   }
   const std::string_view name = text_.substr(at_, end - at_);

@@ -4,9 +4,9 @@
 //
 // A unit is written as factors separated by spaces, * or ·, each with an optional power. A /
 // applies only to the factor after it, or to a group in parentheses: "kg m^2", "N s/m", "m/s/s",
-// "J/(kg K)", "1/s", "mm". A positive number is a factor of the scale. "1" is the unit of a plain
-// number, as are rad and sr; deg and ° are π/180, gn is standard gravity. Symbols are
-// case-sensitive and take the SI prefixes (µ may be written u).
+// "J/(kg K)", "1/s", "mm". The ^ may be left out: "m/s2", "s-1", "m s⁻²". A positive number is a
+// factor of the scale. "1" is the unit of a plain number, as are rad and sr; deg and ° are π/180,
+// gn is standard gravity. Symbols are case-sensitive and take the SI prefixes (µ may be written u).
 
 #include <absl/status/statusor.h>
 

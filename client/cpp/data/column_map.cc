@@ -5,6 +5,7 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>
 #include <absl/strings/str_replace.h>
+#include <absl/strings/strip.h>
 
 #include <algorithm>
 #include <utility>
@@ -50,6 +51,23 @@ std::string WithoutDigits(absl::string_view name) {
   return rest;
 }
 
+// Whether an ending of a header can only be a unit: x_in may be an input and x_min a minimum.
+bool IsUnitEnding(const std::string& ending, const std::string& model_unit) {
+  if (ending.empty() || absl::ascii_isdigit(static_cast<unsigned char>(ending[0]))) return false;
+  if (ending == "in" || ending == "min") return false;
+  return ConvertUnit(ending, model_unit).ok();
+}
+
+// Returns what stands behind a name in a header as a unit would: in parentheses or behind a slash.
+std::string BehindName(absl::string_view header, const std::string& name) {
+  if (!absl::ConsumePrefix(&header, name)) return "";
+  header = absl::StripAsciiWhitespace(header);
+  const bool in_parentheses =
+      absl::ConsumePrefix(&header, "(") && absl::ConsumeSuffix(&header, ")");
+  if (!in_parentheses && !absl::ConsumePrefix(&header, "/")) return "";
+  return std::string(absl::StripAsciiWhitespace(header));
+}
+
 class Mapping {
  public:
   Mapping(const Header& header, const DataColumns& known, const TextLines& lines,
@@ -70,6 +88,7 @@ class Mapping {
     }
     POLYEST_RETURN_IF_ERROR(Map("run", DataColumn::kRun));
     POLYEST_RETURN_IF_ERROR(MapTime());
+    POLYEST_RETURN_IF_ERROR(CheckUnits());
     POLYEST_RETURN_IF_ERROR(CheckSpelling());
     for (const std::string& input : known_.streamed) {
       POLYEST_RETURN_IF_ERROR(CheckThere(input, " for the streamed input of that name"));
@@ -118,9 +137,40 @@ class Mapping {
     return whole.empty() ? named : whole;
   }
 
+  // Whether a header is the name of a quantity or mapped to one.
+  bool IsTaken(const std::string& header) const {
+    const auto has = [&](const auto& names) {
+      return std::find(names.begin(), names.end(), header) != names.end();
+    };
+    return has(known_.measured) || has(known_.streamed) || has(known_.conditions) ||
+           std::any_of(known_.sources.begin(), known_.sources.end(),
+                       [&](const auto& source) { return source.second.from == header; });
+  }
+
+  // Returns the columns whose headers are the quantity's name with a unit that the model's can be
+  // converted from, as x_mm, and parts these headers.
+  std::vector<DataColumn*> FindWithEnding(const std::string& quantity) {
+    std::vector<DataColumn*> found;
+    const auto unit = known_.units.find(quantity);
+    if (unit == known_.units.end()) return found;
+    for (DataColumn& column : columns_) {
+      absl::string_view ending = column.name.header;
+      if (column.role != DataColumn::kIgnored || !absl::ConsumePrefix(&ending, quantity) ||
+          !absl::ConsumePrefix(&ending, "_") || IsTaken(column.name.header) ||
+          !IsUnitEnding(std::string(ending), unit->second)) {
+        continue;
+      }
+      column.name.unit = std::string(ending);
+      column.name.name = quantity;
+      found.push_back(&column);
+    }
+    return found;
+  }
+
   absl::Status Map(const std::string& quantity, DataColumn::Role role) {
     const std::string source = Source(quantity);
-    const std::vector<DataColumn*> found = Find(source.empty() ? quantity : source);
+    std::vector<DataColumn*> found = Find(source.empty() ? quantity : source);
+    if (found.empty() && source.empty()) found = FindWithEnding(quantity);
     if (found.empty()) {
       if (source.empty()) return absl::OkStatus();
       return refused_(Error(absl::StrCat(
@@ -221,13 +271,36 @@ class Mapping {
         " in the problem names it"));
   }
 
-  // Refuses columns whose names are nearly that of a quantity without a column.
-  absl::Status CheckSpelling() {
+  // Returns the quantities without a column.
+  std::vector<std::string> Missing() const {
     std::vector<std::string> missing;
     for (const auto* const names : {&known_.measured, &known_.streamed, &known_.conditions}) {
       std::copy_if(names->begin(), names->end(), std::back_inserter(missing),
                    [&](const std::string& name) { return !HasColumn(name); });
     }
+    return missing;
+  }
+
+  // Refuses columns with the name of a quantity without a column, and behind it what is no unit.
+  absl::Status CheckUnits() {
+    for (const std::string& name : Missing()) {
+      for (DataColumn& column : columns_) {
+        const std::string unit = BehindName(column.name.header, name);
+        if (column.role != DataColumn::kIgnored || unit.empty()) continue;
+        const absl::Status checked = CheckRecordedUnit(unit);
+        if (checked.ok()) continue;
+        column.role = DataColumn::kRefused;
+        POLYEST_RETURN_IF_ERROR(refused_(Error(absl::StrCat(
+            "column ", QuoteCell(column.name.header), ": ", checked.message(), "; if it is ", name,
+            ", map it in the problem: ", SourceLine(name, column.name.header)))));
+      }
+    }
+    return absl::OkStatus();
+  }
+
+  // Refuses columns whose names are nearly that of a quantity without a column.
+  absl::Status CheckSpelling() {
+    const std::vector<std::string> missing = Missing();
     for (DataColumn& column : columns_) {
       if (column.role != DataColumn::kIgnored || column.name.name.empty()) continue;
       std::string nearest = NearestName(column.name.name, missing);

@@ -26,12 +26,6 @@ bool IsUnit(const std::string& cell) {
   return !unit.empty() && unit != "-" && !IsNumberOrTime(unit) && CheckRecordedUnit(unit).ok();
 }
 
-// Returns the rule that a unit breaks, without the list of all symbols.
-std::string Reason(const absl::Status& status) {
-  const absl::string_view message = status.message();
-  return std::string(message.substr(0, message.find("; the symbols are")));
-}
-
 std::string ModelUnit(const DataColumn& column, const DataColumns& known) {
   if (column.role == DataColumn::kTime) return kUnitOfTime;
   const auto unit = known.units.find(column.quantity);
@@ -59,7 +53,7 @@ absl::Status Resolve(const DataColumns& known, const std::string& unit_cell, Dat
   if (column.unit.empty() || column.model_unit.empty()) return absl::OkStatus();
   const auto conversion = ConvertUnit(column.unit, column.model_unit);
   if (!conversion.ok()) {
-    return absl::InvalidArgumentError(absl::StrCat(Reason(conversion.status()), remedy));
+    return absl::InvalidArgumentError(absl::StrCat(conversion.status().message(), remedy));
   }
   column.conversion = *conversion;
   return absl::OkStatus();

@@ -61,10 +61,25 @@ TEST(UnitConversion, RefusesOtherDimensionsAndUnreadableUnits) {
   EXPECT_EQ(Refusal("kN", "m"),
             "values in \"kN\" cannot be converted to \"m\": their dimensions differ");
   EXPECT_THAT(Refusal("quux", "m"), HasSubstr("unknown symbol \"quux\""));
-  EXPECT_THAT(Refusal("°C", "K"), HasSubstr("unknown symbol \"°C\""));
   EXPECT_THAT(Refusal("m", "quux"), HasSubstr("unknown symbol \"quux\""));
   EXPECT_FALSE(CheckRecordedUnit("quux").ok());
   EXPECT_TRUE(CheckRecordedUnit("U/min").ok());
+}
+
+TEST(UnitConversion, AddsTheZeroOfCelsiusToTemperatures) {
+  for (const char* const celsius : {"°C", "deg C", "degC", "Celsius"}) {
+    EXPECT_TRUE(CheckRecordedUnit(celsius).ok()) << celsius;
+    EXPECT_DOUBLE_EQ(Converted(20, celsius, "K"), 293.15) << celsius;
+    EXPECT_DOUBLE_EQ(Converted(20, celsius, "mK"), 293'150) << celsius;
+    EXPECT_FALSE(ConvertUnit(celsius, "K")->IsIdentity()) << celsius;
+  }
+  EXPECT_THAT(Refusal("°C", "rad"), HasSubstr("their dimensions differ"));
+  EXPECT_FALSE(CheckRecordedUnit("W/°C").ok());
+}
+
+TEST(UnitConversion, ReadsWhatLoggersWrite) {
+  EXPECT_DOUBLE_EQ(Converted(3, "m/s2", "m/s^2"), 3);
+  EXPECT_DOUBLE_EQ(Converted(1, "inch", "mm"), 25.4);
 }
 
 TEST(UnitConversion, RefusesCyclesForAngles) {

@@ -86,6 +86,21 @@ TEST(Units, KeepTheirPowersWhenTheyAreWritten) {
   EXPECT_EQ(FormatUnit(Parse("kg^2.5/s^12")), "kg^2.5/s^12");
 }
 
+TEST(Units, MayHavePowersWithoutASign) {
+  for (const auto& [text, unit] : {std::pair{"m/s2", "m/s^2"},
+                                   {"kg m2/s2", "J"},
+                                   {"s-1", "1/s"},
+                                   {"m s-2", "m/s^2"},
+                                   {"m·s⁻²", "m/s^2"},
+                                   {"(m/s)2", "m^2/s^2"},
+                                   {"N/mm2", "MPa"}}) {
+    EXPECT_TRUE(SameUnit(Parse(text), Parse(unit))) << text;
+  }
+  for (const char* const text : {"m1", "m10", "m-", "m2a", "2-1", "-2", "acc2", "m2.5"}) {
+    EXPECT_FALSE(ParseUnit(text).ok()) << text;
+  }
+}
+
 TEST(Units, ThatAreNoneAreRefusedInWords) {
   const auto error = [](const std::string& text) {
     return std::string(ParseUnit(text).status().message());
