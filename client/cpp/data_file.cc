@@ -94,9 +94,11 @@ class DataReader::Reader {
 
   const RowLines& Lines() const { return row_lines_; }
 
+  bool CountsFromFirstRow() const { return rows_ && rows_->clock().from_first_row(); }
+
   std::string Found() const {
     if (!rows_) return "";
-    const std::string text = FoundText({header_, *rows_, lines_.encoding(), units_line_});
+    const std::string text = FoundText({header_, *rows_, lines_.encoding(), units_line_, ended_});
     return text.empty() ? "" : absl::StrCat(lines_.name(), ": ", text);
   }
 
@@ -115,6 +117,7 @@ class DataReader::Reader {
   RowLines row_lines_;
   bool has_run_ = false;
   bool any_refused_ = false;
+  bool ended_ = false;                                // whether all rows have been read
   std::vector<v1::Measurements::Channel*> channels_;  // of the batch being read
 };
 
@@ -176,7 +179,10 @@ absl::Status DataReader::Reader::Read(int64_t max_rows, v1::Measurements& batch,
   while (batch.time_s_size() < max_rows) {
     POLYEST_ASSIGN_OR_RETURN(bool found, NextLine(line));
     if (!rows_) POLYEST_RETURN_IF_ERROR(Start(line, found, refused));
-    if (!found) break;
+    if (!found) {
+      ended_ = true;
+      break;
+    }
     if (batch.channels_size() == 0) AddChannels(batch);
     absl::Status parsed = rows_->Parse(line);
     if (parsed.ok()) {
@@ -220,6 +226,8 @@ absl::Status DataReader::Read(int64_t max_rows, v1::Measurements& batch, Refused
 std::string DataReader::Found() const { return reader_->Found(); }
 
 const RowLines& DataReader::Lines() const { return reader_->Lines(); }
+
+bool DataReader::CountsFromFirstRow() const { return reader_->CountsFromFirstRow(); }
 
 absl::StatusOr<v1::Measurements> ReadDataFile(const std::string& path, const DataColumns& columns,
                                               RefusedLine refused, std::string* found,

@@ -77,9 +77,12 @@ std::string Ignored(const std::vector<DataColumn>& columns) {
                       ")");
 }
 
-std::string Rows(const RowClock& clock) {
-  const std::string rows = Plural(clock.rows(), "row", "rows");
-  if (clock.rows() == 0) return rows;
+std::string Rows(const RowClock& clock, bool whole) {
+  if (clock.rows() == 0) return "0 rows";
+  const std::string rows = whole ? Plural(clock.rows(), "row", "rows")
+                           : clock.rows() == 1
+                               ? "the first row"
+                               : absl::StrCat("the first ", WithThousands(clock.rows()), " rows");
   if (!clock.from_first_row()) return absl::StrFormat("%s from %.9g s", rows, clock.first_time_s());
   return absl::StrCat(rows, ", t = 0 at ", CellText(clock.first_cell()));
 }
@@ -108,7 +111,7 @@ std::string FoundText(const DataFileFound& found) {
   const bool plain =
       std::all_of(parts.begin(), parts.end(), [](const std::string& part) { return part.empty(); });
   if (plain && !found.rows.clock().from_first_row()) return "";
-  parts.push_back(Rows(found.rows.clock()));
+  parts.push_back(Rows(found.rows.clock(), found.whole));
   std::erase(parts, "");
   return absl::StrJoin(parts, "; ");
 }

@@ -16,11 +16,13 @@ struct DataFileFound {
   const RowParser& rows;
   Encoding encoding = Encoding::kUtf8;
   int64_t units_line = 0;  // number of the row of units; 0: there is none
+  bool whole = true;       // whether all rows have been read
 };
 
 // Returns "semicolons, decimal comma; 'Disp [mm]' → x, mm → m; 600,000 rows from 12.345 s". Returns
 // an empty text if there is nothing to say but the rows: commas, decimal points, and columns of the
-// quantities' own names in the model's units.
+// quantities' own names in the model's units. Where further rows may follow, they are "the first 64
+// rows".
 std::string FoundText(const DataFileFound& found);
 
 }  // namespace polyest::internal

@@ -41,7 +41,7 @@ TEST(DataPipe, ReturnsRowsAsSoonAsTheyAreThere) {
     EXPECT_EQ(batch->channels(0).values(0), (row + 0.5) / 1000);
   }
   EXPECT_EQ(reader->Found(),
-            "pipe: semicolons, decimal comma; 'x [mm]' → x, mm → m; 3 rows from 0 s");
+            "pipe: semicolons, decimal comma; 'x [mm]' → x, mm → m; the first 3 rows from 0 s");
 }
 
 TEST(DataPipe, CountsRowsWithSeparators) {

@@ -140,12 +140,16 @@ class DataReader {
                     RefusedLine refused = StopAtRefusedLine);
 
   // Returns what has been found out so far, in one line: "data.csv: semicolons, decimal comma;
-  // 'Disp [mm]' → x, mm → m; 600 rows from 0 s". Empty for a file that has commas, decimal points
+  // 'Disp [mm]' → x, mm → m; 600 rows from 0 s", or "the first 600 rows" before the end of the data
+  // is reached. Empty for a file that has commas, decimal points
   // and columns of the quantities' own names in the model's units only.
   std::string Found() const;
 
   // Returns the lines of the rows read so far, for messages about a row.
   const RowLines& Lines() const;
+
+  // Whether the times read so far count from the first row of their run, as dates do.
+  bool CountsFromFirstRow() const;
 
  private:
   class Reader;
