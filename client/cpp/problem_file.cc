@@ -18,6 +18,7 @@
 #include "proto/wire/json/json_error.h"
 #include "proto/wire/json/json_structure.h"
 #include "proto/wire/json/unknown_fields.h"
+#include "proto/wire/json/wrong_values.h"
 #include "proto/wire/transport/automatic_order.h"
 
 namespace polyest {
@@ -71,6 +72,8 @@ absl::StatusOr<v1::Problem> ParseProblem(absl::string_view json, absl::string_vi
   }
   const auto unknown = FindUnknownFields(json, *v1::Problem::descriptor());
   if (!unknown.empty()) return UnknownFieldsError(name, unknown);
+  const std::string wrong = FindWrongValue(WithoutAutomaticOrder(json), *v1::Problem::descriptor());
+  if (!wrong.empty()) return absl::InvalidArgumentError(absl::StrCat(name, ": ", wrong));
   return InFile(name, DescribeJsonError(json, {status.message().data(), status.message().size()}));
 }
 

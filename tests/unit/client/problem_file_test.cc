@@ -6,6 +6,7 @@
 namespace polyest::internal::problem_file_test {
 namespace {
 
+using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
@@ -76,17 +77,38 @@ TEST(ParseProblem, SaysThatDataAreNoProblem) {
 }
 
 TEST(ParseProblem, NamesAFieldOfTheWrongType) {
-  EXPECT_THAT(ErrorOf(R"({"uncertain": [{"uniform": {"lower": "low"}}]})"),
-              StartsWith("problem.json: uncertain[0].uniform.lower: invalid value \"low\""));
-  EXPECT_THAT(ErrorOf(R"({"expansion": {"order": 2.5}})"),
-              StartsWith("problem.json: expansion.order: invalid value 2.5"));
+  EXPECT_EQ(ErrorOf(R"({"uncertain": [{"uniform": {"lower": "low"}}]})"),
+            "problem.json: uncertain[0].uniform.lower: \"low\" must be a number");
+  EXPECT_EQ(ErrorOf(R"({"expansion": {"order": 2.5}})"),
+            "problem.json: expansion.order: 2.5 must be a whole number");
+  EXPECT_EQ(ErrorOf(R"({"expansion": {"order": 1e10}})"),
+            "problem.json: expansion.order: 10000000000 must be a whole number below 2^31");
+  EXPECT_EQ(ErrorOf(R"({"expansion": {"adaptive": 3}})"),
+            "problem.json: expansion.adaptive: 3 must be true or false");
+  EXPECT_EQ(ErrorOf(R"({"fixed": {"m": [1]}})"), "problem.json: fixed.m: a list must be a number");
+  EXPECT_EQ(ErrorOf(R"({"fixed": [1]})"),
+            "problem.json: fixed: a list must be an object, in braces { }");
+  EXPECT_EQ(ErrorOf(R"({"uncertain": "k"})"),
+            "problem.json: uncertain: \"k\" must be a list, in brackets [ ]");
+  EXPECT_EQ(ErrorOf(R"({"uncertain": [{"name": 5}]})"),
+            "problem.json: uncertain[0].name: 5 must be a text in quotes");
+  EXPECT_EQ(ErrorOf(R"({"uncertain": [{"uniform": 5}]})"),
+            "problem.json: uncertain[0].uniform: 5 must be an object, in braces { }");
+}
+
+TEST(ParseProblem, NamesTheWordsThatAFieldTakes) {
   EXPECT_THAT(ErrorOf(R"({"expansion": {"points": "SOBOL"}})"),
-              StartsWith("problem.json: expansion.points: invalid value \"SOBOL\""));
+              StartsWith("problem.json: expansion.points: \"SOBOL\" must be one of HALTON, "));
+  EXPECT_THAT(ErrorOf(R"({"expansion": {"points": "HALTN"}})"), EndsWith("; did you mean HALTON?"));
+  // The word for an order that is found out is no wrong value.
+  EXPECT_EQ(ErrorOf(R"({"expansion": {"order": "AUTOMATIC", "adaptive": "yes"}})"),
+            "problem.json: expansion.adaptive: \"yes\" must be true or false");
 }
 
 TEST(ParseProblem, RefusesASecondPrior) {
   EXPECT_THAT(ErrorOf(R"({"uncertain": [{"uniform": {}, "normal": {}}]})"),
-              HasSubstr("'prior' is already set"));
+              StartsWith("problem.json: uncertain[0]: normal and uniform are both given; only one "
+                         "of uniform, normal, "));
 }
 
 TEST(ParseProblem, FindsTheLineOfASyntaxError) {

@@ -1,0 +1,18 @@
+#pragma once
+
+// Finds a value of a JSON text that its protobuf message cannot take, and says in plain words what
+// it must be. Protobuf's own words for it name its internal types.
+
+#include <absl/strings/string_view.h>
+#include <google/protobuf/descriptor.h>
+
+#include <string>
+
+namespace polyest::internal {
+
+// Returns "uncertain[0].uniform.lower: \"low\" must be a number" for the first wrong value in the
+// order of the fields' names, or for an object with two members of which only one may be given.
+// Empty if the text is not one JSON object, or if there is no such value.
+std::string FindWrongValue(absl::string_view json, const google::protobuf::Descriptor& message);
+
+}  // namespace polyest::internal
