@@ -15,6 +15,7 @@
 #include "core/common/status.h"
 #include "proto/wire/transport/file_text.h"
 #include "proto/wire/transport/loopback.h"
+#include "proto/wire/transport/pem_file.h"
 
 namespace polyest {
 
@@ -41,23 +42,20 @@ grpc::ChannelArguments Arguments(const ClientOptions& options) {
   return arguments;
 }
 
-absl::StatusOr<std::string> ReadClientFile(const char* what, const std::string& file) {
-  auto text = ReadFileText(file);
-  if (text.ok()) return text;
-  return absl::InvalidArgumentError(absl::StrCat(what, ": ", text.status().message()));
-}
-
-absl::StatusOr<std::string> ReadPem(const char* what, const std::string& file) {
-  if (file.empty()) return std::string();
-  POLYEST_ASSIGN_OR_RETURN(std::string text, ReadClientFile(what, file));
-  if (text.find("-----BEGIN ") != std::string::npos) return text;
-  return absl::InvalidArgumentError(absl::StrCat(what, ": ", file, " is not in PEM form"));
+absl::StatusOr<PemFile> ReadClientPem(const char* option, const std::string& file) {
+  auto pem = ReadPemFile(option, file);
+  if (!pem.ok()) return absl::InvalidArgumentError(pem.status().message());
+  return pem;
 }
 
 absl::StatusOr<std::string> ReadToken(const ClientOptions& options) {
   std::string token = options.token;
   if (!options.token_file.empty()) {
-    POLYEST_ASSIGN_OR_RETURN(token, ReadClientFile("token file", options.token_file));
+    auto text = ReadFileText(options.token_file);
+    if (!text.ok()) {
+      return absl::InvalidArgumentError(absl::StrCat("token file: ", text.status().message()));
+    }
+    token = *std::move(text);
     absl::StripAsciiWhitespace(&token);
     if (token.empty()) {
       return absl::InvalidArgumentError(
@@ -77,10 +75,19 @@ absl::StatusOr<std::shared_ptr<grpc::ChannelCredentials>> Credentials(const Clie
     return absl::InvalidArgumentError("a client's certificate and its key must be given together");
   }
   grpc::SslCredentialsOptions options;
-  POLYEST_ASSIGN_OR_RETURN(options.pem_root_certs, ReadPem("CA file", tls.ca_file));
-  POLYEST_ASSIGN_OR_RETURN(options.pem_cert_chain,
-                           ReadPem("certificate file", tls.certificate_file));
-  POLYEST_ASSIGN_OR_RETURN(options.pem_private_key, ReadPem("key file", tls.key_file));
+  if (!tls.ca_file.empty()) {
+    POLYEST_ASSIGN_OR_RETURN(PemFile authorities, ReadClientPem("--tls-ca", tls.ca_file));
+    POLYEST_RETURN_IF_ERROR(CheckCertificates(authorities));
+    options.pem_root_certs = std::move(authorities.text);
+  }
+  if (!tls.certificate_file.empty()) {
+    POLYEST_ASSIGN_OR_RETURN(PemFile certificate,
+                             ReadClientPem("--tls-certificate", tls.certificate_file));
+    POLYEST_ASSIGN_OR_RETURN(PemFile key, ReadClientPem("--tls-key", tls.key_file));
+    POLYEST_RETURN_IF_ERROR(CheckCertificateAndKey(certificate, key));
+    options.pem_cert_chain = std::move(certificate.text);
+    options.pem_private_key = std::move(key.text);
+  }
   return grpc::SslCredentials(options);
 }
 

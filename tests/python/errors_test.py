@@ -218,7 +218,9 @@ def test_a_role_that_does_not_allow_the_call(guarded, problem):
     ({"token": "two words", "ca": "x"}, "must be one word"),
     ({"token_file": "/nowhere"}, "token_file: /nowhere cannot be read"),
     ({"ca": "/nowhere"}, "ca: /nowhere cannot be read"),
-    ({"ca": "/dev/null"}, "/dev/null is not in PEM form"),
+    ({"ca": "/dev/null"}, "ca: /dev/null has no certificate in PEM form"),
+    ({"certificate": "/dev/null", "key": "/dev/null"},
+     "certificate: /dev/null has no certificate in PEM form"),
     ({"certificate": "x"}, "a certificate and its key must be given together"),
 ])
 def test_a_connection_that_cannot_be_safe(options, said):

@@ -84,3 +84,18 @@ def test_a_token_that_is_replaced_takes_effect(secured, certificates, tmp_path):
             client.status()
         token.write_text((certificates / "rig.token").read_text())
         assert client.status().version
+
+
+@pytest.mark.parametrize(("changes", "said"), [
+    ({"ca": "ca.key"}, "ca: .*ca.key has no certificate in PEM form"),
+    ({"ca": "broken"}, "ca: .*broken has no certificate in PEM form, or one that cannot be read"),
+    ({"certificate": "client.key"}, "certificate: .*client.key has no certificate"),
+    ({"key": "client.pem"}, "key: .*client.pem has no private key in PEM form"),
+    ({"key": "daemon.key"}, "key: .*daemon.key is not the key of .*client.pem"),
+])
+def test_a_file_that_cannot_be_used_is_named_before_connecting(certificates, changes, said):
+    text = (certificates / "ca.pem").read_text()
+    (certificates / "broken").write_text(text[:100] + "\n-----END CERTIFICATE-----\n")
+    changes = {name: certificates / file for name, file in changes.items()}
+    with pytest.raises(polyest.InvalidInput, match=said):
+        polyest.connect("127.0.0.1:1", **options(certificates, token_file=None, **changes))

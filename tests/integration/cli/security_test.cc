@@ -160,13 +160,33 @@ TEST_F(SecurityTest, NamesFilesThatAreNoGoodAndNothingOfThem) {
     return OneLine(Run(arguments), 2);
   };
   EXPECT_THAT(models({"--tls-ca", bad}),
-              AllOf(HasSubstr(bad + " is not in PEM form"), Not(HasSubstr("secret"))));
+              AllOf(HasSubstr("--tls-ca: " + bad + " has no certificate in PEM form"),
+                    Not(HasSubstr("secret"))));
   EXPECT_THAT(models({"--tls-ca", "/nowhere/ca.pem"}),
               HasSubstr("/nowhere/ca.pem: cannot be read"));
   EXPECT_THAT(models({"--token-file", bad}),
               AllOf(HasSubstr("token: must be one word"), Not(HasSubstr("secret"))));
   EXPECT_THAT(models({"--token-file", File("empty", "\n")}), HasSubstr("is empty"));
   EXPECT_THAT(models({"--tls-certificate", certificate_}), HasSubstr("--tls-key"));
+}
+
+TEST_F(SecurityTest, SaysBeforeItConnectsWhichCertificateOrKeyIsNoGood) {
+  const auto models = [this](const std::string& certificate, const std::string& key) {
+    return OneLine(Run({"models", "--server", "localhost:1", "--tls-ca", ca_, "--tls-certificate",
+                        certificate, "--tls-key", key}),
+                   2);
+  };
+  EXPECT_THAT(models(key_, key_),
+              HasSubstr("--tls-certificate: " + key_ + " has no certificate in PEM form"));
+  EXPECT_THAT(models(certificate_, certificate_),
+              HasSubstr("--tls-key: " + certificate_ + " has no private key in PEM form"));
+  EXPECT_THAT(models(certificate_, File("other.key", authority_.Issue("other").key)),
+              HasSubstr("other.key is not the key of " + certificate_));
+  const std::string half =
+      authority_.certificate() + "-----BEGIN CERTIFICATE-----\nAAAA\n-----END CERTIFICATE-----\n";
+  EXPECT_THAT(
+      OneLine(Run({"models", "--server", "localhost:1", "--tls-ca", File("half", half)}), 2),
+      HasSubstr("half has 1 certificate and then one that cannot be read: "));
 }
 
 TEST_F(SecurityTest, ShowsAClientsCertificateToADaemonThatAsksForOne) {

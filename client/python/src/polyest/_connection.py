@@ -5,6 +5,7 @@ from __future__ import annotations
 import ipaddress
 import os
 import re
+import ssl
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Optional, Union
@@ -99,9 +100,11 @@ class ConnectionOptions:
                 raise _invalid("token", f"{self.server} is not a loopback address; tokens are sent "
                                "only over TLS (ca=…)")
             return None
-        return grpc.ssl_channel_credentials(
-            *(None if file is None else _pem(what, file) for what, file in
-              (("ca", self.ca), ("key", self.key), ("certificate", self.certificate))))
+        ca = None if self.ca is None else _certificates("ca", self.ca)
+        if self.certificate is None or self.key is None:
+            return grpc.ssl_channel_credentials(ca)
+        certificate = _certificates("certificate", self.certificate)
+        return grpc.ssl_channel_credentials(ca, _key(self.key, self.certificate), certificate)
 
     def error_of(self, error: grpc.RpcError) -> PolyestError:
         """Returns the exception of a failed call, with the server's name if there is none."""
@@ -123,10 +126,31 @@ def _text(what: str, file: File) -> bytes:
         raise _invalid(what, f"{file} cannot be read: {error.strerror}") from error
 
 
-def _pem(what: str, file: File) -> bytes:
+def _certificates(what: str, file: File) -> bytes:
+    """Returns the text of a file of certificates. Raises InvalidInput if it has none.
+
+    gRPC would find a fault only at the first call, and say nothing of the file.
+    """
     text = _text(what, file)
-    if b"-----BEGIN " not in text:
-        raise _invalid(what, f"{file} is not in PEM form")
+    try:
+        ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT).load_verify_locations(cadata=text.decode("ascii"))
+    except (ssl.SSLError, ValueError):
+        raise _invalid(what, f"{file} has no certificate in PEM form, or one that cannot be "
+                       "read") from None
+    return text
+
+
+def _key(file: File, certificate: File) -> bytes:
+    """Returns the text of the key of a certificate. Raises InvalidInput if it is not that."""
+    text = _text("key", file)
+    try:
+        # Without the passphrase OpenSSL would ask the terminal for one.
+        ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT).load_cert_chain(certificate, file, lambda: "")
+    except ssl.SSLError as error:
+        if error.reason in ("KEY_VALUES_MISMATCH", "KEY_TYPE_MISMATCH"):
+            raise _invalid("key", f"{file} is not the key of {certificate}") from None
+        raise _invalid("key", f"{file} has no private key in PEM form without a "
+                       "passphrase") from None
     return text
 
 
