@@ -138,6 +138,9 @@ class StreamCommand {
     auto session = WaitForSession();
     if (!session.ok() && interrupted()) return std::nullopt;
     if (!session.ok()) return InInput(session.status());
+    if (reader->CountsFromFirstRow()) {
+      POLYEST_RETURN_IF_ERROR(CheckZeroOfTime(client_, *session, first, DataName()));
+    }
     auto last = Send(*session, *reader, std::move(first), read);
     if (!last.ok()) return InInput(last.status());
     return last;

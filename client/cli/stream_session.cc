@@ -5,6 +5,7 @@
 #include <google/protobuf/util/message_differencer.h>
 
 #include <algorithm>
+#include <map>
 
 #include "core/common/status.h"
 
@@ -35,7 +36,58 @@ absl::Status CheckWindow(const v1::Session& session, const std::string& id, doub
                       id));
 }
 
+int RunOf(const v1::Measurements& batch, int row) {
+  return batch.run().empty() ? 0 : batch.run(row);
+}
+
+// Returns the values of a row by channel, without what is missing.
+std::map<std::string, double> ValuesOf(const v1::Measurements& batch, int row) {
+  std::map<std::string, double> values;
+  for (const v1::Measurements::Channel& channel : batch.channels()) {
+    const auto& missing = channel.missing();
+    if (std::ranges::find(missing, row) == missing.end()) {
+      values[channel.name()] = channel.values(row);
+    }
+  }
+  return values;
+}
+
+// Returns whether the first row that the session has of the run of the batch's first row is that
+// row.
+absl::StatusOr<bool> BeginsWithRowOf(Client& client, const StreamSession& session,
+                                     const v1::Measurements& batch) {
+  bool found = false, same = false;
+  v1::ExportSessionRequest request;
+  request.set_name(session.name);
+  const absl::Status exported =
+      client.ExportSession(request, [&](const v1::SessionRecord& piece) -> absl::Status {
+        const v1::Measurements& kept = piece.batch().measurements();
+        for (int row = 0; row < kept.time_s_size() && !found; ++row) {
+          found = RunOf(kept, row) == RunOf(batch, 0);
+          same = found && kept.time_s(row) == batch.time_s(0) &&
+                 ValuesOf(kept, row) == ValuesOf(batch, 0);
+        }
+        return found ? absl::CancelledError("the row is found") : absl::OkStatus();
+      });
+  if (!found) POLYEST_RETURN_IF_ERROR(exported);
+  return same;
+}
+
 }  // namespace
+
+absl::Status CheckZeroOfTime(Client& client, const StreamSession& session,
+                             const v1::Measurements& batch, const std::string& data) {
+  if (!session.resumed_after || RunOf(batch, 0) > session.resumed_after->run) {
+    return absl::OkStatus();
+  }
+  POLYEST_ASSIGN_OR_RETURN(const bool same, BeginsWithRowOf(client, session, batch));
+  if (same) return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrFormat(
+      "%s: its times count from its first row, as dates and --time-zero first do, but %s counts "
+      "those of run %d from another row; send the record from the run's first row on, of which "
+      "rows are skipped that the session has, or write the times in s since that row",
+      data, session.name, RunOf(batch, 0)));
+}
 
 absl::StatusOr<StreamSession> OpenSession(Client& client, const v1::Problem& problem,
                                           const std::string& id, double reorder_window_s) {

@@ -29,6 +29,12 @@ struct StreamSession {
 absl::StatusOr<StreamSession> OpenSession(Client& client, const v1::Problem& problem,
                                           const std::string& id, double reorder_window_s);
 
+// Checks that the first row of `batch`, whose times count from it, is the first row that the
+// session has of its run, or is of a later run than the session has. Otherwise the times of the two
+// would count from different rows: INVALID_ARGUMENT, which names `data` and says what to do.
+absl::Status CheckZeroOfTime(Client& client, const StreamSession& session,
+                             const v1::Measurements& batch, const std::string& data);
+
 // Removes the leading rows up to and including `place` and returns their number.
 int RemoveRowsUpTo(const RowPlace& place, v1::Measurements& batch);
 // Removes the rows from number `row` on, counted from 0.

@@ -1,4 +1,4 @@
-// Tests what `polyest stream` says of a file's rows.
+// Tests what `polyest stream` says of a file's rows and how it takes times that are dates.
 
 #include <gmock/gmock.h>
 
@@ -7,6 +7,7 @@
 namespace polyest::internal {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 
 class StreamTimesTest : public CommandTest {
@@ -30,6 +31,27 @@ TEST_F(StreamTimesTest, SaysThatItKnowsTheFirstRowsOnlyWhenItBegins) {
               HasSubstr("d.csv: 'x [m]' → x; the first 10 rows from 0.05 s"));
   EXPECT_THAT(Run(Command(data, {"--batch", "50"})).err,
               HasSubstr("d.csv: 'x [m]' → x; 40 rows from 0.05 s"));
+}
+
+TEST_F(StreamTimesTest, ResumesWithDatesOnlyFromTheFirstRowOfTheSession) {
+  const std::string header = "time,run,x\n";
+  const std::string begin = "2026-01-31T10:00:00,0,1\n2026-01-31T10:00:01,0,0.9\n";
+  const std::string end = "2026-01-31T10:00:02,0,0.5\n2026-01-31T10:00:03,0,0.4\n";
+  const std::vector<std::string> options = {"--session", "rig-1", "--format", "jsonl"};
+  ASSERT_EQ(Run(Command(File("a.csv", header + begin), options)).exit_status, 0);
+  const Finished rest = Run(Command(File("b.csv", header + end), options));
+  EXPECT_EQ(rest.exit_status, 2);
+  EXPECT_EQ(rest.out, "");
+  EXPECT_THAT(rest.err, AllOf(HasSubstr("b.csv: its times count from its first row"),
+                              HasSubstr("sessions/rig-1 counts those of run 0 from another row")));
+  const Finished whole = Run(Command(File("c.csv", header + begin + end), options));
+  ASSERT_EQ(whole.exit_status, 0) << whole.err;
+  EXPECT_EQ(ParseEstimate(Lines(whole.out).back()).samples(), 4);
+  EXPECT_EQ(ParseEstimate(Lines(whole.out).back()).time(), 3);
+  const std::string next = header + "2026-01-31T11:00:00,1,1\n2026-01-31T11:00:01,1,0.9\n";
+  const Finished run = Run(Command(File("d.csv", next), options));
+  ASSERT_EQ(run.exit_status, 0) << run.err;
+  EXPECT_EQ(ParseEstimate(Lines(run.out).back()).samples(), 6);
 }
 
 }  // namespace
