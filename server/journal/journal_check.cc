@@ -10,6 +10,7 @@
 
 #include "core/common/status.h"
 #include "server/digest/digest.h"
+#include "server/journal/history_check.h"
 #include "server/journal/seal_check.h"
 #include "server/journal/session_digest.h"
 #include "server/journal/sqlite_parts.h"
@@ -144,7 +145,8 @@ absl::Status WriteBackupSeals(SqliteDatabase& database, const std::vector<Seal>&
         .BindBlob(seal.chain);
     POLYEST_RETURN_IF_ERROR(query.Run());
   }
-  return database.Execute("COMMIT");
+  POLYEST_RETURN_IF_ERROR(database.Execute("COMMIT"));
+  return WriteHistoryDigests(database);
 }
 
 absl::StatusOr<std::vector<Seal>> ReadBackupSeals(SqliteDatabase& database) {
@@ -173,6 +175,7 @@ absl::Status RestoreBackupSeals(SqliteDatabase& database, SessionSeals& seals) {
     for (const Seal& seal : kept) seals.Put(seal);
     seals.Sync();
   }
+  POLYEST_RETURN_IF_ERROR(DropHistoryDigests(database));
   return database.Execute("DROP TABLE backup_seal");
 }
 
@@ -182,6 +185,7 @@ absl::StatusOr<JournalContents> CheckJournal(SqliteDatabase& database, const Sto
   JournalContents contents;
   absl::Status checked = CheckStructure(database, contents.damage);
   if (checked.ok()) checked = CheckSessions(database, contents);
+  if (checked.ok()) checked = CheckHistories(database, contents.damage);
   POLYEST_RETURN_IF_ERROR(stop.Check());
   // A database that cannot be read to its end is damaged, which is what was asked.
   if (absl::IsDataLoss(checked)) {

@@ -1,7 +1,7 @@
 #pragma once
 
-// Verifies a journal's file completely: its structure, the digests of all sessions and batches, and
-// the seals of a backup.
+// Verifies a journal's file completely: its structure, the digests of all sessions and batches, the
+// histories of estimates, and the seals of a backup.
 
 #include <absl/status/statusor.h>
 
@@ -15,12 +15,13 @@
 
 namespace polyest::internal {
 
-// Writes the seals into a table of a backup, which is one file and has no other place for them.
+// Writes the seals and the digests of the histories into tables of a backup, which is one file and
+// has no other place for them.
 absl::Status WriteBackupSeals(SqliteDatabase& database, const std::vector<Seal>& seals);
 // Returns the seals of a backup; none where there is no such table.
 absl::StatusOr<std::vector<Seal>> ReadBackupSeals(SqliteDatabase& database);
-// Puts the seals of a restored backup into their file if that has just been made, and removes the
-// table.
+// Puts the seals of a restored backup into their file if that has just been made, and removes both
+// tables.
 absl::Status RestoreBackupSeals(SqliteDatabase& database, SessionSeals& seals);
 
 // Reads all of a database and returns what it has. FAILED_PRECONDITION when it is no journal, or

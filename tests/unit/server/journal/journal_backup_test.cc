@@ -3,6 +3,8 @@
 
 #include "server/journal/journal_backup.h"
 
+#include <absl/strings/escaping.h>
+#include <absl/strings/str_cat.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -11,6 +13,7 @@
 #include <fstream>
 #include <thread>
 
+#include "polyest/v1/estimate.pb.h"
 #include "server/journal/journal_check.h"
 #include "server/journal/memory_journal.h"
 #include "server/journal/sqlite_journal.h"
@@ -157,6 +160,33 @@ TEST_F(JournalBackupTest, TellsOfDamage) {
   std::ofstream(file) << "no database at all, whatever its name says, and long enough to be read";
   EXPECT_TRUE(absl::IsDataLoss(CheckJournalFile(file).status()));
   EXPECT_TRUE(absl::IsNotFound(CheckJournalFile(file + "-none").status()));
+}
+
+TEST_F(JournalBackupTest, TellsOfAnotherHistoryOfEstimates) {
+  const int64_t session = CreateIn(*journal_, "sessions/a", SmallProblem());
+  ASSERT_TRUE(Append(session, 1).ok());
+  v1::EstimateHistory::Point point;
+  point.set_time_s(1);
+  journal_->SaveHistoryPoint(session, {0, 1, point.SerializeAsString()}, 1);
+  ASSERT_TRUE(Append(session, 2).ok());  // behind the point
+  const std::string file = BackUp();
+  ASSERT_THAT(CheckJournalFile(file)->damage, IsEmpty());
+  const auto change = [&](const std::string& statement) {
+    const auto database = SqliteDatabase::Open(file).value();
+    EXPECT_TRUE(database->Execute(statement).ok());
+    return CheckJournalFile(file)->damage;
+  };
+  point.set_time_s(2);
+  EXPECT_THAT(change(absl::StrCat("UPDATE history SET point = x'",
+                                  absl::BytesToHexString(point.SerializeAsString()), "'")),
+              ElementsAre("sessions/a of tenant t: its history of estimates is not the one of the "
+                          "backup"));
+  EXPECT_THAT(
+      change("UPDATE history SET point = x'ff'"),
+      ElementsAre("sessions/a of tenant t: a point of its history of estimates is damaged"));
+  EXPECT_THAT(change("DELETE FROM history"),
+              ElementsAre("sessions/a of tenant t: its history of estimates is not the one of the "
+                          "backup"));
 }
 
 TEST_F(JournalBackupTest, IsMadeOneAtATime) {
