@@ -96,12 +96,22 @@ std::optional<std::string> UnknownOption(const CLI::App& app) {
   return std::nullopt;
 }
 
+// Returns "--until: x must be a number" for a value that CLI11 "could not convert: --until = x",
+// and the words of other errors in one line.
+std::string Words(const CLI::ParseError& error) {
+  const std::string words = absl::StrReplaceAll(error.what(), {{"\n", " "}});
+  constexpr absl::string_view kNumber = "Could not convert: ";
+  const size_t at = words.find(" = ");
+  if (!absl::StartsWith(words, kNumber) || at == words.npos) return words;
+  return absl::StrCat(words.substr(kNumber.size(), at - kNumber.size()), ": ", words.substr(at + 3),
+                      " must be a number");
+}
+
 // Prints an error of the command line in one line and returns the exit status.
 int ReportUsage(const CLI::App& app, const CLI::ParseError& error, std::ostream& err) {
   const std::vector<CLI::App*> parsed = app.get_subcommands();
   const std::string command = parsed.empty() ? "" : parsed.front()->get_name();
-  const std::string what =
-      UnknownOption(app).value_or(absl::StrReplaceAll(error.what(), {{"\n", " "}}));
+  const std::string what = UnknownOption(app).value_or(Words(error));
   err << "polyest: " << (command.empty() ? "" : command + ": ") << what << "; see polyest "
       << (command.empty() ? "" : command + " ") << "--help" << std::endl;
   return kExitBadInput;

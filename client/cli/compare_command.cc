@@ -16,6 +16,7 @@
 #include "client/cli/problem_input.h"
 #include "client/cli/text_table.h"
 #include "core/common/status.h"
+#include "proto/wire/convert/problem.h"
 
 namespace polyest::internal {
 namespace {
@@ -40,9 +41,24 @@ absl::StatusOr<Contestant> Assess(const std::string& file, const CompareArgument
   return contestant;
 }
 
+// Refuses a horizon if no problem has a filter, whose predictions alone it changes.
+absl::Status CheckHorizon(const CompareArguments& arguments) {
+  if (arguments.hold_out.horizon_s == 0) return absl::OkStatus();
+  for (auto file = arguments.files.begin(); file + 1 != arguments.files.end(); ++file) {
+    POLYEST_ASSIGN_OR_RETURN(const v1::Problem problem, ReadCheckedProblem(*file, arguments.place));
+    if (UsesFilters(problem)) return absl::OkStatus();
+  }
+  return absl::InvalidArgumentError(
+      absl::StrFormat("--horizon: %g must be left out, since none of the problems has process "
+                      "noise or drift, for which alone later samples change predictions",
+                      arguments.hold_out.horizon_s));
+}
+
 absl::StatusOr<std::vector<Contestant>> Compare(const CompareArguments& arguments) {
+  POLYEST_RETURN_IF_ERROR(CheckHorizon(arguments));
   const auto backend = MakeBackend(arguments.place);
   std::vector<Contestant> all;
+  DataWarnings warnings;
   for (auto file = arguments.files.begin(); file + 1 != arguments.files.end(); ++file) {
     POLYEST_ASSIGN_OR_RETURN(Contestant one, Assess(*file, arguments, *backend, warnings));
     all.push_back(std::move(one));
@@ -58,7 +74,6 @@ absl::StatusOr<std::vector<Contestant>> Compare(const CompareArguments& argument
       all, [&](const Contestant& one) { return HaveComparableEvidence(one, all.front()); });
   if (!comparable) {
     for (Contestant& one : all) one.log_evidence.reset();
-  DataWarnings warnings;
   }
   std::ranges::stable_sort(all, std::greater(), [](const Contestant& one) {
     return one.log_evidence.value_or(one.log_score);

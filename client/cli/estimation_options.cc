@@ -69,7 +69,7 @@ void AddPosterior(CommandRegistry& registry) {
       arguments);
   AddStudyInput(command, *arguments);
   command.add_option("--samples", arguments->samples, "Samples of the posterior to print")
-      ->check(CLI::Range(0, 100'000));
+      ->check(WholeBetween(0, 100'000));
   command
       .add_option("--quantiles", arguments->probabilities,
                   "Probabilities of the quantiles, P,P,… (default 0.025,0.5,0.975)")
@@ -129,9 +129,9 @@ void AddFit(CommandRegistry& registry) {
                   "Probabilities of the quantiles, P,P,… (default 0.025,0.5,0.975)")
       ->delimiter(',');
   command.add_option("--draws", arguments->draws, "Trajectories of the model (default 400)")
-      ->check(CLI::Range(2, 10'000));
+      ->check(WholeBetween(2, 10'000));
   command.add_option("--rows", arguments->rows, "The most rows to print (default 2000)")
-      ->check(CLI::Range(1, 1'000'000));
+      ->check(WholeBetween(1, 1'000'000));
   AddTimesOfFit(command, *arguments);
   AddPlot(command, arguments->plot_file, "the fit");
   AddFormat(command, arguments->format, {"table", "json", "csv"});
@@ -208,7 +208,7 @@ void AddProfile(CommandRegistry& registry) {
       ->expected(1)
       ->take_all();
   command.add_option("--points", arguments->points, "Values of each parameter (default 41)")
-      ->check(CLI::Range(3, 1'001));
+      ->check(WholeBetween(3, 1'001));
   AddPlot(command, arguments->plot_file, "the profiles");
   AddFormat(command, arguments->format, {"table", "json", "csv"});
 }
@@ -255,7 +255,7 @@ void AddRegularization(CommandRegistry& registry) {
   command.add_option("--highest", arguments->highest, "The greatest α² (default 1e4)")
       ->check(Between(1e-8, 1e8));
   command.add_option("--points", arguments->points, "Values of α² (default 33)")
-      ->check(CLI::Range(2, 1'001));
+      ->check(WholeBetween(2, 1'001));
   AddPlot(command, arguments->plot_file, "the sweep");
   AddFormat(command, arguments->format, {"table", "json", "csv"});
 }

@@ -106,7 +106,7 @@ void AddDesign(CommandRegistry& registry) {
   command.add_option("--step", arguments->step_s,
                      "Step between possible sample times, s (default: a hundredth of --until)");
   command.add_option("--samples", arguments->samples, "Sample times to choose (default: 10)")
-      ->check(CLI::Range(1, 1000));
+      ->check(WholeBetween(1, 1000));
   command
       .add_option("--candidate", arguments->candidate_files,
                   "A problem file whose inputs are another candidate")

@@ -26,7 +26,7 @@ void AddStream(CommandRegistry& registry) {
   AddDataOptions(command, arguments->data_options);
   AddServer(command, arguments->place)->required();
   command.add_option("--batch", arguments->batch_rows, "Rows per message")
-      ->check(CLI::Range(1, 100'000))
+      ->check(WholeBetween(1, 100'000))
       ->capture_default_str();
   command
       .add_option("--rate", arguments->rate,

@@ -2,10 +2,10 @@
 
 #include <absl/strings/numbers.h>
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
 #include <arpa/inet.h>
 
 #include <charconv>
-#include <cmath>
 #include <map>
 #include <utility>
 
@@ -70,19 +70,30 @@ void AddAccess(CLI::App& command, ServerAccess& access) {
 }  // namespace
 
 CLI::Validator Between(double least, double most) {
-  const CLI::Range range(least, most);
-  const auto check = [range](std::string& text) {
+  const auto check = [least, most](const std::string& text) {
     double number = 0;
-    if (absl::SimpleAtod(text, &number) && std::isnan(number)) return text + " is not a number";
-    return range(text);
+    const bool in_range = absl::SimpleAtod(text, &number) && number >= least && number <= most;
+    return in_range ? std::string()
+                    : absl::StrFormat("%s must be a number from %g to %g", text, least, most);
   };
-  return CLI::Validator(check, range.get_description());
+  return CLI::Validator(check, CLI::Range(least, most).get_description());
+}
+
+CLI::Validator WholeBetween(int least, int most) {
+  const auto check = [least, most](const std::string& text) {
+    int number = 0;
+    const bool in_range = absl::SimpleAtoi(text, &number) && number >= least && number <= most;
+    return in_range ? std::string()
+                    : absl::StrFormat("%s must be a whole number from %d to %d", text, least, most);
+  };
+  return CLI::Validator(check, CLI::Range(least, most).get_description());
 }
 
 CLI::Option* AddServer(CLI::App& command, Place& place) {
   command
       .add_option("--deadline", place.deadline_s,
-                  "Give up this many seconds after the start; 0: never")
+                  "Give up this many seconds after the start, with the exit status 1, or 3 with\n"
+                  "--server; 0: never")
       ->check(Between(0.0, 1e9));
   AddAccess(command, place.access);
   return command.add_option("--server", place.server, "The daemon to ask, HOST:PORT")
@@ -96,9 +107,9 @@ std::vector<CLI::Option*> AddModelFolders(CLI::App& command, Place& place) {
                          "Folder with descriptions of UM-Bridge models for local computations")};
 }
 
-void AddThreads(CLI::App& command, int& threads) {
-  command.add_option("--threads", threads, "Threads for computing in this process")
-      ->check(CLI::Range(1, 256))
+CLI::Option* AddThreads(CLI::App& command, int& threads) {
+  return command.add_option("--threads", threads, "Threads for computing in this process")
+      ->check(WholeBetween(1, 256))
       ->capture_default_str();
 }
 
@@ -108,7 +119,7 @@ CLI::Option* AddPlace(CLI::App& command, Place& place) {
       ->description("Compute in this process (the default)")
       ->excludes(server);
   for (CLI::Option* const folder : AddModelFolders(command, place)) folder->excludes(server);
-  AddThreads(command, place.threads);
+  AddThreads(command, place.threads)->excludes(server);
   return server;
 }
 

@@ -10,13 +10,16 @@
 
 namespace polyest::internal {
 
-// Accepts numbers from `least` to `most`, as CLI::Range, which accepts "nan" as well.
+// Accepts numbers from `least` to `most`. CLI::Range accepts "nan" as well.
 CLI::Validator Between(double least, double most);
+// Accepts whole numbers from `least` to `most`.
+CLI::Validator WholeBetween(int least, int most);
 // Adds --server, --deadline and the options for access to a daemon. Returns --server.
 CLI::Option* AddServer(CLI::App& command, Place& place);
 // Adds --fmu-dir and --umbridge-dir and returns them.
 std::vector<CLI::Option*> AddModelFolders(CLI::App& command, Place& place);
-void AddThreads(CLI::App& command, int& threads);
+// Adds --threads and returns it.
+CLI::Option* AddThreads(CLI::App& command, int& threads);
 // Adds the choice between a daemon and this process: AddServer, --local, AddModelFolders and
 // --threads. Returns --server.
 CLI::Option* AddPlace(CLI::App& command, Place& place);

@@ -114,6 +114,8 @@ TEST_F(CompareTest, RefusesWhatCannotBeCompared) {
   const std::string one = File("one.csv", "t,position\n0.5,0.1\n");
   EXPECT_THAT(refusal({linear_, one, "--hold-out", "0.3"}),
               HasSubstr("--hold-out: 0.3 of 1 rows leaves none to predict"));
+  EXPECT_THAT(refusal({linear_, data_, "--horizon", "2"}),
+              HasSubstr("--horizon: 2 must be left out, since none of the problems has process"));
   EXPECT_THAT(refusal(std::vector<std::string>(20, linear_)),
               HasSubstr("20 problems are more than 19"));
   for (const char* const number : {"-1", "far", "nan", "inf"}) {

@@ -62,6 +62,26 @@ TEST_F(UsageTest, SaysThatTheFilesAreSwapped) {
               HasSubstr("oscillator.csv: is CSV data; a problem"));
 }
 
+TEST_F(UsageTest, SaysWhatANumberMustBe) {
+  const auto refused = [](const std::string& command, const std::string& option,
+                          const std::string& value) {
+    return Refused({command, "p.json", "d.csv", option, value});
+  };
+  EXPECT_THAT(refused("regularization", "--lowest", "0"),
+              HasSubstr("--lowest: 0 must be a number from 1e-08 to 1e+08; see"));
+  EXPECT_THAT(refused("fit", "--draws", "2.5"),
+              HasSubstr("--draws: 2.5 must be a whole number from 2 to 10000; see"));
+  EXPECT_THAT(refused("posterior", "--quantiles", "half"),
+              HasSubstr("--quantiles: half must be a number; see"));
+  EXPECT_THAT(refused("estimate", "--deadline", "nan"),
+              HasSubstr("--deadline: nan must be a number from 0 to 1e+09; see"));
+}
+
+TEST_F(UsageTest, RefusesThreadsOfThisProcessForADaemon) {
+  EXPECT_THAT(Refused({"estimate", "p.json", "d.csv", "--threads", "2", "--server", "rig:50051"}),
+              HasSubstr("--server excludes --threads"));
+}
+
 TEST_F(UsageTest, GroupsTheCommandsByPurpose) {
   const Finished help = Run({"--help"});
   ASSERT_EQ(help.exit_status, 0);
