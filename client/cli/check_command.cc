@@ -1,7 +1,10 @@
+#include <absl/strings/ascii.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_replace.h>
+#include <absl/strings/strip.h>
 #include <google/protobuf/struct.pb.h>
 
+#include <map>
 #include <optional>
 #include <sstream>
 
@@ -27,13 +30,13 @@ namespace polyest::internal {
 namespace {
 
 // Number of errors of a data file that are shown; the others are only counted.
-constexpr int kMaxLines = 20;
+constexpr size_t kMaxLines = 20;
 
 struct Findings {
   std::vector<std::string> errors;
   std::vector<std::string> warnings;
-  int unlisted = 0;     // errors that one of `errors` only counts
-  std::string summary;  // empty if there are errors
+  int64_t unlisted = 0;  // errors that `errors` only count, less those that only count others
+  std::string summary;   // empty if there are errors
 
   // Adds an error whose message names the file, as those of reading a file do.
   void AddError(const absl::Status& status) {
@@ -45,20 +48,70 @@ struct Findings {
   }
 };
 
+// Collects the errors of a file's lines. An error that many lines have is shown once.
+class RefusedLines {
+ public:
+  explicit RefusedLines(const std::string& file) : file_(file) {}
+
+  void Add(const absl::Status& refusal) {
+    const std::string sentence = Sentence(refusal);
+    const auto known = places_.find(sentence);
+    if (known != places_.end()) {
+      ++errors_[known->second].repeated;
+    } else if (errors_.size() == kMaxLines) {
+      ++unlisted_;
+    } else {
+      places_[sentence] = errors_.size();
+      errors_.push_back({refusal});
+    }
+  }
+
+  void AddTo(Findings& findings) const {
+    for (const Error& error : errors_) {
+      findings.AddError(error.first);
+      findings.unlisted += error.repeated;
+      if (error.repeated == 0) continue;
+      absl::StrAppend(&findings.errors.back(), " (and so in ", error.repeated,
+                      error.repeated == 1 ? " further line)" : " further lines)");
+    }
+    if (unlisted_ == 0) return;
+    findings.unlisted += unlisted_ - 1;
+    findings.errors.push_back(absl::StrCat(file_, ": … and ", unlisted_, " more"));
+  }
+
+ private:
+  struct Error {
+    absl::Status first;
+    int64_t repeated = 0;
+  };
+
+  // Returns what an error says after the file and the number of the line.
+  std::string Sentence(const absl::Status& refusal) const {
+    absl::string_view text = refusal.message();
+    if (!absl::ConsumePrefix(&text, file_ + ":")) return std::string(text);
+    while (!text.empty() && absl::ascii_isdigit(static_cast<unsigned char>(text[0]))) {
+      text.remove_prefix(1);
+    }
+    return std::string(text);
+  }
+
+  const std::string file_;
+  std::vector<Error> errors_;
+  std::map<std::string, size_t> places_;  // in `errors_`
+  int64_t unlisted_ = 0;
+};
+
 // Reads the rows that are valid and adds the errors of the others to the findings.
 std::optional<v1::Measurements> ReadRows(const std::string& file, const DataColumns& columns,
                                          DataInFile& read, Findings& findings) {
-  int refused = 0;
+  RefusedLines refused(file);
   const auto note = [&](const absl::Status& refusal) {
-    if (++refused <= kMaxLines) findings.AddError(refusal);
+    refused.Add(refusal);
     return absl::OkStatus();
   };
   auto data = ReadData(file, columns, read, note);
+  refused.AddTo(findings);
   if (!data.ok()) findings.AddError(data.status());
-  if (refused > kMaxLines) {
-    findings.unlisted = refused - kMaxLines;
-    findings.errors.push_back(absl::StrCat(file, ": … and ", findings.unlisted, " more"));
-  }
   if (!data.ok()) return std::nullopt;
   return *std::move(data);
 }
@@ -166,8 +219,7 @@ int RunCommand(const CheckArguments& arguments, std::ostream& out, std::ostream&
   for (const std::string& error : findings.errors) {
     err << Paint(err, Color::kRed, "polyest:") << ' ' << error << '\n';
   }
-  const auto listed = std::ssize(findings.errors);
-  const auto count = findings.unlisted > 0 ? listed - 1 + findings.unlisted : listed;
+  const int64_t count = std::ssize(findings.errors) + findings.unlisted;
   err << "polyest: " << count << (count == 1 ? " error" : " errors") << std::endl;
   return kExitBadInput;
 }

@@ -13,6 +13,7 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::ElementsAre;
+using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
@@ -88,13 +89,25 @@ TEST_F(CheckTest, NamesAProblemFileThatIsCalledAsAField) {
 
 TEST_F(CheckTest, CountsTheBadLinesThatItDoesNotShow) {
   std::string data = "t,x\n";
-  for (int i = 0; i < 50; ++i) absl::StrAppend(&data, i, ",?\n");
+  for (int i = 0; i < 50; ++i) absl::StrAppend(&data, i, ",?", i, "\n");
   const Finished run = Run({"check", Example("oscillator.json"), File("d.csv", data)});
   EXPECT_EQ(run.exit_status, 2);
   const std::vector<std::string> lines = Lines(run.err);
   EXPECT_THAT(lines, SizeIs(22));
   EXPECT_THAT(lines[20], HasSubstr("d.csv: … and 30 more"));
   EXPECT_EQ(lines[21], "polyest: 50 errors");
+}
+
+TEST_F(CheckTest, SaysOnceWhatIsWrongWithManyLines) {
+  std::string data = "t,x\n";
+  for (int i = 0; i < 50; ++i) absl::StrAppend(&data, i, i == 30 ? ",!\n" : ",?\n");
+  const Finished run = Run({"check", Example("oscillator.json"), File("d.csv", data)});
+  EXPECT_EQ(run.exit_status, 2);
+  EXPECT_THAT(
+      Lines(run.err),
+      ElementsAre(AllOf(HasSubstr("d.csv:2: column x: \"?\" must be a number"),
+                        EndsWith(" (and so in 48 further lines)")),
+                  HasSubstr("d.csv:32: column x: \"!\" must be a number"), "polyest: 50 errors"));
 }
 
 TEST_F(CheckTest, AnswersInJson) {
