@@ -24,6 +24,8 @@ constexpr std::pair<absl::string_view, absl::string_view> kOptions[] = {
 
 // Returns the message of a status, which names the option in place of the field that it fills.
 std::string MessageOf(const absl::Status& status) {
+  // The words of gRPC and of the core do not name the option, without which no command gives up.
+  if (absl::IsDeadlineExceeded(status)) return "there is no answer within the --deadline";
   const std::optional<FieldPath> field = FieldOf(status);
   for (const auto& [name, option] : kOptions) {
     if (!field || field->empty() || field->steps().front().text() != name) continue;

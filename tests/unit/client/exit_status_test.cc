@@ -41,6 +41,12 @@ TEST(Report, NamesTheServerThatRefused) {
   EXPECT_EQ(err.str(), "polyest: server rig:50051: no route\n");
 }
 
+TEST(Report, NamesTheOptionThatMakesACommandGiveUp) {
+  std::ostringstream err;
+  EXPECT_EQ(Report(absl::DeadlineExceededError("Deadline Exceeded"), kServer, err), 3);
+  EXPECT_EQ(err.str(), "polyest: server rig:50051: there is no answer within the --deadline\n");
+}
+
 TEST(Report, NamesTheOptionInPlaceOfTheField) {
   std::ostringstream err;
   EXPECT_EQ(Report(InvalidField("probabilities[0]", "2 must lie between 0 and 1"), "", err), 2);
