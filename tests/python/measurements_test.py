@@ -255,3 +255,17 @@ def test_texts_with_decimal_commas_are_refused_with_what_reads_them():
     with pytest.raises(polyest.InvalidInput, match=r"x: row 1 .*'0,81' is a text with a decimal "
                        r"comma; pandas.read_csv\(…, sep=\";\", decimal=\",\"\)"):
         converter().convert(data)
+
+
+def test_a_unit_may_stand_behind_an_underscore():
+    found = converter().convert({"t_ms": [0.0, 1000.0], "x_mm": [1.0, 2.0]})
+    assert list(found.time_s) == [0.0, 1.0]
+    assert [(one.name, one.unit) for one in found.channels] == [("x", "mm")]
+    with pytest.raises(polyest.InvalidInput, match="no column of a measured output"):
+        converter().convert({"t": [0.0], "x_in": [1.0]})
+    with pytest.raises(polyest.InvalidInput, match="x: may be the column 'x_mm', 'x_cm'"):
+        converter().convert({"t": [0.0], "x_mm": [1.0], "x_cm": [0.1]})
+    mapped = MEASURED.copy().measure("x_m", 0.1)
+    with pytest.warns(UserWarning, match="x_km"):
+        both = converter(mapped).convert({"t": [0.0], "x": [1.0], "x_m": [2.0], "x_km": [3.0]})
+    assert values_of(both) == {"x": [1.0], "x_m": [2.0]}

@@ -27,6 +27,12 @@ _HEADER = re.compile(r"^(?P<name>.*?)\s*(?:\[(?P<a>[^\]]*)\]|\((?P<b>[^)]*)\)"
 _NAME = re.compile(r"(?<![\w.])[A-Za-z_]\w*(?!\w*\s*\()")
 
 
+# Units behind an underscore, as in "x_mm". Not "in" and "min": x_in may be an input.
+_ENDINGS = frozenset(
+    "m mm cm km um µm nm inch ft s ms us µs deg rad rpm Hz kHz g kg t N kN MN mN Nm kNm "
+    "Pa kPa MPa bar mbar psi V mV A mA K degC W kW J kJ kph kmh mph".split())
+
+
 def _split_header(header: str) -> tuple[str, str]:
     """Returns a header's name and unit; an empty unit if it has none."""
     match = _HEADER.match(header)
@@ -185,7 +191,20 @@ class MeasurementConverter:
             name, in_header = _split_header(header)
             if name == wanted and in_header:
                 return header, unit or in_header, values
-        return None
+        return None if source else self._find_with_ending(table, quantity, unit)
+
+    def _find_with_ending(self, table: Table, quantity: str,
+                          unit: str) -> Optional[tuple[str, str, Array]]:
+        """Returns the column of a quantity with its unit behind an underscore, as in "x_mm"."""
+        taken = {*self.names, *(header for header, _ in self._sources.values())}
+        found = [(header, header[len(quantity) + 1:]) for header in table.columns
+                 if header.startswith(f"{quantity}_") and header not in taken
+                 and header[len(quantity) + 1:] in _ENDINGS]
+        if len(found) > 1:
+            raise refuse(quantity, f"may be the column {_listed([one for one, _ in found])}; "
+                         f"columns.{quantity}.from of the problem decides")
+        return next(((header, unit or ending, table.columns[header]) for header, ending in found),
+                    None)
 
     def _check_units(self) -> None:
         headers = [header for quantity, (header, _) in self._sources.items()
