@@ -101,8 +101,8 @@ TEST(ParseProblem, NamesTheWordsThatAFieldTakes) {
               StartsWith("problem.json: expansion.points: \"SOBOL\" must be one of HALTON, "));
   EXPECT_THAT(ErrorOf(R"({"expansion": {"points": "HALTN"}})"), EndsWith("; did you mean HALTON?"));
   // The word for an order that is found out is no wrong value.
-  EXPECT_EQ(ErrorOf(R"({"expansion": {"order": "AUTOMATIC", "adaptive": "yes"}})"),
-            "problem.json: expansion.adaptive: \"yes\" must be true or false");
+  EXPECT_EQ(ErrorOf(R"({"expansion": {"order": "AUTO", "pointsPerTerm": "two"}})"),
+            "problem.json: expansion.pointsPerTerm: \"two\" must be a number");
 }
 
 TEST(ParseProblem, RefusesASecondPrior) {
