@@ -367,3 +367,19 @@ def test_a_local_daemon_ends_with_its_program(end, tmp_path):
     ended, _, _ = select.select([descriptor], [], [], 30)
     os.close(descriptor)
     assert ended
+
+
+def test_dates_do_not_go_on_a_run_that_counts_from_another_row(client, problem):
+    def dates(second, count):
+        begin = np.datetime64("2026-01-31T10:00:00") + np.timedelta64(second, "s")
+        return {"t": begin + np.arange(count) * np.timedelta64(1, "s"), "x": np.ones(count)}
+
+    with client.session("by-date", problem) as session:
+        session.append(dates(0, 3))
+        session.append(dates(3, 3))
+    with client.session("by-date") as session:
+        with pytest.raises(polyest.InvalidInput, match=r"t: dates count from the first row .*t = 5 s "
+                           r"of run 0 already; .* the next run, 1"):
+            session.append(dates(6, 20))
+        session.append({**dates(6, 20), "run": np.ones(20, dtype=int)})
+        assert session.info().sample_count == 26

@@ -11,7 +11,7 @@ from typing import Optional
 
 import numpy as np
 
-from polyest._proto.v1 import measurements_pb2, problem_pb2
+from polyest._proto.v1 import measurements_pb2, problem_pb2, session_service_pb2
 from polyest._table import Array, Clock, Data, Floats, Table, floats, refuse, row_text
 from polyest.io._choices import nearest
 from polyest.io._recording import Batch, Recording
@@ -63,11 +63,12 @@ class MeasurementConverter:
     """
 
     def __init__(self, problem: problem_pb2.Problem,
-                 units: Optional[Mapping[str, str]] = None, *, apart: bool = False) -> None:
+                 units: Optional[Mapping[str, str]] = None, *, apart: bool = False,
+                 resumed: Optional[session_service_pb2.Session] = None) -> None:
         """`units` names the unit of columns by quantity, as in {"x": "mm", "t": "ms"}.
 
-        apart: channels may come in batches of their own. Raises InvalidInput for a name in `units`
-        that the problem does not have.
+        apart: channels may come in batches of their own. resumed: a session that has rows of other
+        data already. Raises InvalidInput for a name in `units` that the problem does not have.
         """
         # The field's name is a word of Python.
         self._sources = {name: (getattr(column, "from"), column.unit)
@@ -79,6 +80,7 @@ class MeasurementConverter:
         self._conditions = [name for name in dict.fromkeys(_NAME.findall(problem.use_when))
                             if name not in known]
         self._apart = apart
+        self._resumed = resumed
         self._clock = Clock()
         self._noted: set[str] = set()
         self._given: set[str] = set()  # the channels of all batches so far
@@ -111,8 +113,11 @@ class MeasurementConverter:
         table = Table(data)
         used: list[str] = []
         message = Measurements(end_of_run=end_of_run)
+        counted = self._clock.counts_dates
         message.time_s.extend(self._times(table, used))
         self._add_run(table, message, used)
+        if self._clock.counts_dates and not counted:
+            self._check_first_date(message)
         for quantity in self.names:
             self._add_channel(table, quantity, message, used)
         self._check_channels(message, table.columns,
@@ -146,6 +151,17 @@ class MeasurementConverter:
             raise refuse("t", f"no column of the time; the columns are {_listed(table.columns)}")
         used.append(header)
         return self._clock.seconds(header, column, unit)
+
+    def _check_first_date(self, message: Measurements) -> None:
+        """Refuses dates that count from a row in the middle of a run of the session."""
+        session = self._resumed
+        if session is None or (message.run and message.run[0] > session.last_run):
+            return
+        self.begin_anew()
+        raise refuse("t", "dates count from the first row of the data, but "
+                     f"{session.name} has rows up to t = {session.last_time_s:g} s of run "
+                     f"{session.last_run} already; give times in s since the run's first row, or "
+                     f"begin the next run, {session.last_run + 1}, in a column run")
 
     def _add_run(self, table: Table, message: Measurements, used: list[str]) -> None:
         found = self._find(table, "run")

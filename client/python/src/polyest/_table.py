@@ -155,6 +155,11 @@ class Clock:
     def __init__(self) -> None:
         self._origin: Optional[np.datetime64] = None
 
+    @property
+    def counts_dates(self) -> bool:
+        """Whether there has been a date, from which others count."""
+        return self._origin is not None
+
     def seconds(self, name: str, values: Array, unit: str) -> Floats:
         """Returns times in s. `values` are numbers in `unit`, time differences or dates."""
         if _has_zone(values):

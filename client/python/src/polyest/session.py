@@ -45,7 +45,8 @@ class Session(SessionStudies):
         self._options = options
         self._on_estimate = on_estimate
         self._converter = MeasurementConverter(created.problem, units,
-                                               apart=created.reorder_window_s > 0)
+                                               apart=created.reorder_window_s > 0,
+                                               resumed=created if created.sample_count else None)
         self._any_kept = False  # of the rows before the present stream
 
     @property
