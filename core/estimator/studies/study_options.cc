@@ -17,7 +17,7 @@ absl::Status CheckProbabilities(const std::vector<double>& probabilities) {
   for (size_t i = 0; i < probabilities.size(); ++i) {
     if (probabilities[i] > 0 && probabilities[i] < 1) continue;
     return InvalidField(FieldPath{"probabilities", i},
-                        absl::StrFormat("%g must lie between 0 and 1", probabilities[i]));
+                        absl::StrFormat("%g must be above 0 and below 1", probabilities[i]));
   }
   return absl::OkStatus();
 }

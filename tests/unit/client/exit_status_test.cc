@@ -49,10 +49,10 @@ TEST(Report, NamesTheOptionThatMakesACommandGiveUp) {
 
 TEST(Report, NamesTheOptionInPlaceOfTheField) {
   std::ostringstream err;
-  EXPECT_EQ(Report(InvalidField("probabilities[0]", "2 must lie between 0 and 1"), "", err), 2);
+  EXPECT_EQ(Report(InvalidField("probabilities[0]", "2 must be above 0 and below 1"), "", err), 2);
   EXPECT_EQ(Report(InvalidField("fixed.q", "unknown"), "", err), 2);
   EXPECT_EQ(err.str(),
-            "polyest: --quantiles: 2 must lie between 0 and 1\npolyest: fixed.q: unknown\n");
+            "polyest: --quantiles: 2 must be above 0 and below 1\npolyest: fixed.q: unknown\n");
 }
 
 }  // namespace

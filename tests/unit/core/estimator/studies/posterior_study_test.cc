@@ -182,10 +182,10 @@ TEST(PosteriorOptions, NameFieldValueAndRule) {
   EXPECT_EQ(message(options), "samples: 100001 must be from 0 to 100000");
   options = {};
   options.probabilities = {0.5, 1};
-  EXPECT_EQ(message(options), "probabilities[1]: 1 must lie between 0 and 1");
+  EXPECT_EQ(message(options), "probabilities[1]: 1 must be above 0 and below 1");
   options = {};
   options.probabilities = {NAN};
-  EXPECT_EQ(message(options), "probabilities[0]: nan must lie between 0 and 1");
+  EXPECT_EQ(message(options), "probabilities[0]: nan must be above 0 and below 1");
   options = {};
   options.density_bins = 1001;
   EXPECT_EQ(message(options), "density_bins: 1001 must be from 0 to 1000");
