@@ -11,6 +11,7 @@
 #include "client/cli/backend.h"
 #include "client/cli/commands.h"
 #include "client/cli/data_input.h"
+#include "client/cli/data_warnings.h"
 #include "client/cli/estimate_format.h"
 #include "client/cli/exit_status.h"
 #include "client/cli/input_files.h"
@@ -83,6 +84,7 @@ absl::StatusOr<Design> DesignExperiment(const DesignArguments& arguments) {
         DataColumnsFor(experiment.problem(), arguments.place, arguments.data_options));
     POLYEST_ASSIGN_OR_RETURN(*experiment.mutable_measurements(),
                              ReadData(arguments.data_file, columns, files.data));
+    DataWarnings().Print(experiment.problem(), arguments.place, experiment.measurements());
   }
   POLYEST_RETURN_IF_ERROR(AddCandidates(arguments, request));
   request.set_until_s(arguments.until_s);
