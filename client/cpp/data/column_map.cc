@@ -290,6 +290,7 @@ class Mapping {
         const absl::Status checked = CheckRecordedUnit(unit);
         if (checked.ok()) continue;
         column.role = DataColumn::kRefused;
+        column.quantity = name;
         POLYEST_RETURN_IF_ERROR(refused_(Error(absl::StrCat(
             "column ", QuoteCell(column.name.header), ": ", checked.message(), "; if it is ", name,
             ", map it in the problem: ", SourceLine(name, column.name.header)))));

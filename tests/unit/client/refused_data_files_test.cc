@@ -54,14 +54,13 @@ const RefusedCase kRefusals[] = {
      "t, x, F\n0,1,2\n",
      ":1: the file has one column with the delimiter \";\" that --delimiter names: \"t, x, F\"",
      {"without the option, the delimiter is found out"},
-     [](DataColumns& c) {
-  c.options.delimiter = ';'; }},
+     [](DataColumns& c) { c.options.delimiter = ';'; }},
     {"NearMiss",
      "t,x,Frce\n0,1,2\n",
      ":1: unknown column \"Frce\"; did you mean \"Force\"?",
      {"\"columns\": {\"Force\": {\"from\": \"Frce\"}}"},
      [](DataColumns& c) {
-  c.measured = {"x", "Force"};
+       c.measured = {"x", "Force"};
      }},
     {"OtherCase", "t,X\n0,1\n", ":1: unknown column \"X\"; did you mean \"x\"?", {}},
     {"DuplicateHeaders", "t,x,x\n0,1,2\n", ":1: the column \"x\" is named twice", {}},
@@ -74,7 +73,7 @@ const RefusedCase kRefusals[] = {
      ":1: the column \"Disp\" would be both x and F",
      {},
      [](DataColumns& c) {
-  c.sources = {{"x", {"Disp", ""}}, {"F", {"Disp", ""}}};
+       c.sources = {{"x", {"Disp", ""}}, {"F", {"Disp", ""}}};
      }},
     {"OtherDimension",
      "t,x [kN]\n0,1\n",
@@ -88,8 +87,7 @@ const RefusedCase kRefusals[] = {
      "t,x [Hz]\n0,1\n",
      ":1: column \"x [Hz]\" (x)",
      {"one counts cycles, the other angles"},
-     [](DataColumns& c) {
-  c.units["x"] = "rad/s"; }},
+     [](DataColumns& c) { c.units["x"] = "rad/s"; }},
     {"UnreadableUnit",
      "t,x [quux]\n0,1\n",
      ":1: column \"x [quux]\" (x)",
@@ -106,10 +104,7 @@ const RefusedCase kRefusals[] = {
      "t,x_mm,x_cm\n0,1,2\n",
      ":1: the column \"x_mm\" is named twice, also as \"x_cm\"",
      {"columns.x.from"}},
-    {"EndingThatMayBeNoUnit",
-     "t,x_in\n0,1\n",
-     ":1: ",
-     {R"x("columns": {"x": {"from": "x_in"}})x"}},
+    {"EndingThatMayBeNoUnit", "t,x_in\n0,1\n", ":1: ", {R"x("columns": {"x": {"from": "x_in"}})x"}},
     {"UnreadableUnitOfTime",
      "t [ticks],x\n0,1\n",
      ":2: column \"t [ticks]\" (t)",
