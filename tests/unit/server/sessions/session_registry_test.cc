@@ -204,10 +204,8 @@ TEST_F(SessionRegistryTest, AgreesWithTheJournalHoweverCreationsImportsAndDeleti
           break;
         case 1: {
           SessionImport import(*registry_, "t");
-          balance +=
-              import.Take(ImportOf("a")).ok() && import.Take(End()).ok() && import.Finish().ok()
-                  ? 1
-                  : 0;
+          const bool taken = import.Take(ImportOf("a")).ok() && import.Take(End()).ok();
+          balance += taken && import.Finish().ok() ? 1 : 0;
           break;
         }
         default:
