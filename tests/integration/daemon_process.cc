@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 
 #include "core/common/check.h"
 
@@ -65,13 +66,16 @@ int DaemonProcess::Wait() {
   return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
 }
 
-std::string DaemonProcess::Errors() {
+std::string DaemonProcess::Errors() const {
+  // The daemon writes at the position that it shares with this process, which must stay.
   std::string text;
-  std::rewind(errors_);
-  for (int c = std::fgetc(errors_); c != EOF; c = std::fgetc(errors_)) {
-    text.push_back(static_cast<char>(c));
+  std::array<char, 65'536> bytes;
+  while (true) {
+    const ssize_t count =
+        pread(fileno(errors_), bytes.data(), bytes.size(), static_cast<off_t>(text.size()));
+    if (count <= 0) return text;
+    text.append(bytes.data(), static_cast<size_t>(count));
   }
-  return text;
 }
 
 }  // namespace polyest::internal

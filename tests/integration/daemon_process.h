@@ -31,7 +31,7 @@ class DaemonProcess {
   // Returns the exit status, or −(signal) if a signal ended the daemon.
   int Wait();
   // Returns everything that the daemon has written to stderr so far.
-  std::string Errors();
+  std::string Errors() const;
 
  private:
   TestFolder data_;
