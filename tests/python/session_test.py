@@ -353,6 +353,14 @@ def test_a_local_daemon_ends_with_its_client():
         client.status()
 
 
+def test_who_reads_the_log_of_a_local_daemon_does_not_move_where_it_writes():
+    with polyest.local() as client:
+        log = client.daemon._log.fileno()
+        os.lseek(log, 3, os.SEEK_SET)  # as if the daemon were in the middle of its log
+        assert "ready" in client.daemon.log()
+        assert os.lseek(log, 0, os.SEEK_CUR) == 3
+
+
 @pytest.mark.parametrize("end", ["sys.exit(3)", "os.kill(os.getpid(), signal.SIGKILL)"])
 def test_a_local_daemon_ends_with_its_program(end, tmp_path):
     program = ("import os, signal, sys, polyest\n"

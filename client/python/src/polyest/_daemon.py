@@ -73,8 +73,9 @@ class Daemon:
 
     def log(self) -> str:
         """Returns what it has logged so far."""
-        self._log.seek(0)
-        return self._log.read().decode(errors="replace")
+        # The daemon writes at the position that it shares with this program, which must stay.
+        log = self._log.fileno()
+        return os.pread(log, os.fstat(log).st_size, 0).decode(errors="replace")
 
     def stop(self) -> None:
         """Ends it in order: open calls may finish."""
