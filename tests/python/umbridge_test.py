@@ -19,6 +19,7 @@ import serve  # noqa: E402  (the example is a script beside its problem)
 PROBLEM = SERVE / "oscillator.json"
 
 # The example's server at a given port. It breaks off every so many answers after the header, and dies.
+# At 127.0.0.1 another program, or an attempt to connect, might take the port while no server has it.
 MORTAL = """
 import os, sys
 sys.path.insert(0, sys.argv[1])
@@ -34,7 +35,7 @@ class Mortal(serve.Handler):
             self.wfile.flush()
             os._exit(9)
         super().answer(status, message)
-server = serve.Server(("127.0.0.1", int(sys.argv[2])), Mortal)
+server = serve.Server(("127.0.0.2", int(sys.argv[2])), Mortal)
 print(server.server_port, flush=True)
 server.serve_forever()
 """
@@ -113,7 +114,7 @@ class Mortals:
         self._ended = False
         self._lock = threading.Lock()
         self._processes = [self._start(0, life) for life in lives]
-        self.urls = [f"http://127.0.0.1:{port}" for _, port in self._processes]
+        self.urls = [f"http://127.0.0.2:{port}" for _, port in self._processes]
         self._threads = [threading.Thread(target=self._revive, args=(i, life))
                          for i, life in enumerate(lives)]
         for thread in self._threads:

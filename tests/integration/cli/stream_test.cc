@@ -19,6 +19,10 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
+// Where a daemon listens that another one follows at its port. At 127.0.0.1 another program, or an
+// attempt to connect, might take the port while no daemon has it.
+constexpr char kRestartable[] = "127.0.0.2:0";
+
 class StreamTest : public CommandTest {
  protected:
   std::vector<std::string> Command(const std::string& data,
@@ -274,8 +278,8 @@ TEST_F(StreamTest, CreatesNoSessionForDataWithoutAnyValidRow) {
 
 TEST_F(StreamTest, GoesOnWhereItStoodWhenTheDaemonWasKilledAndStartedAgain) {
   const TestFolder data;
-  auto daemon =
-      std::make_unique<DaemonProcess>(std::vector<std::string>{"--data-dir", data.path()});
+  auto daemon = std::make_unique<DaemonProcess>(std::vector<std::string>{"--data-dir", data.path()},
+                                                kRestartable);
   const std::string address = daemon->address();
   std::vector<std::string> arguments = {POLYEST_PROGRAM,
                                         "stream",
@@ -369,13 +373,13 @@ TEST_F(StreamTest, GivesUpAtALimitThatWaitingDoesNotCure) {
 }
 
 TEST_F(StreamTest, SaysThatARestartedDaemonHasLostTheSession) {
-  std::vector<std::string> arguments = Command("-", {});
-  arguments.insert(arguments.begin(), POLYEST_PROGRAM);
-  Process process(arguments);
+  DaemonProcess daemon({}, kRestartable);
+  Process process(
+      {POLYEST_PROGRAM, "stream", Example("oscillator.json"), "-", "--server", daemon.address()});
   process.Write(DemoRows(30));
   EXPECT_THAT(process.ReadLine(), StartsWith("t = 1.5 s"));
-  daemon_.Kill();
-  DaemonProcess restarted({}, daemon_.address());
+  daemon.Kill();
+  DaemonProcess restarted({}, daemon.address());
   process.CloseInput();
   process.ReadAll();
   EXPECT_EQ(process.Wait(), 3);

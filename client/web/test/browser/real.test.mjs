@@ -92,7 +92,8 @@ test('all panels follow a record that polyest streams', options, async () => {
 });
 
 test('the page finds a daemon that was killed and restarted, and its session', options, async () => {
-  const first = await start('--listen', '127.0.0.1:0', '--web', '127.0.0.1:0', '--data-dir', join(folder, 'data'));
+  // At 127.0.0.1 another program, or an attempt to connect, might take the port while no daemon has it.
+  const first = await start('--listen', '127.0.0.1:0', '--web', '127.0.0.2:0', '--data-dir', join(folder, 'data'));
   await stream(first.server, 'monday', '--batch', '50');
   const page = await open(`${first.web}#/monday`);
   await says(page, '1000 samples');
