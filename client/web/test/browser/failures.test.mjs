@@ -68,8 +68,11 @@ test('a daemon that drains ends the stream, and the page comes back', options, (
   const page = await open(browser, `${daemon.address}#/monday`);
   await page.waitForSelector('.strip');
   await until(() => session.watchers.size === 1, 'a watcher');
+  // Calls are refused until the page has been seen to say so.
+  daemon.fail('GetSession', new Failure(14, 'the daemon is shutting down'));
   session.end(14, 'the daemon is shutting down');
   await says(page, /The daemon is shutting down\. Trying again/);
+  daemon.fail('GetSession', null);
   await until(() => session.watchers.size === 1, 'a new stream');
   assert.equal(session.watchers.size, 1);
   await page.context().close();
