@@ -6,7 +6,7 @@
 import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
 import { once } from 'node:events';
-import { mkdtempSync, rmSync, writeFileSync } from 'node:fs';
+import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
@@ -59,12 +59,32 @@ function stream(server, session, ...args) {
   return once(child, 'exit');
 }
 
+// Streams the record, five rows at a time: slowly until `hurry` is called, so that there are new
+// estimates when the page has opened, however long that takes.
+function feed(server, session) {
+  const child = spawn(POLYEST_COMMAND, ['stream', example('oscillator.json'), '-', '--server', server, '--session', session, '--batch', '5'],
+                      { stdio: ['pipe', 'ignore', 'inherit'] });
+  children.push(child);
+  child.stdin.on('error', () => undefined);  // of a child that has ended; its status tells why
+  const [header, ...rows] = readFileSync(example('oscillator.csv'), 'utf8').trimEnd().split('\n');
+  child.stdin.write(`${header}\n`);
+  let pauseMs = 120;
+  const send = () => {
+    child.stdin.write(rows.splice(0, 5).map((row) => `${row}\n`).join(''));
+    if (rows.length > 0) setTimeout(send, pauseMs);
+    else child.stdin.end();
+  };
+  send();
+  return { end: once(child, 'exit'), hurry: () => { pauseMs = 20; } };
+}
+
 test('all panels follow a record that polyest streams', options, async () => {
   const daemon = await start('--listen', '127.0.0.1:0', '--web', '127.0.0.1:0', '--durability', 'memory');
-  const end = stream(daemon.server, 'monday', '--batch', '5', '--rate', '12');
+  const feeding = feed(daemon.server, 'monday');
   const page = await open(daemon.web);
   await page.getByRole('link', { name: 'monday' }).click({ timeout: 20_000 });
   await status(page, 'Live');
+  feeding.hurry();
   await page.waitForSelector('.strip[data-verdict="IDENTIFIED"]');
   await says(page, 'Measured and predicted: x');
   await page.waitForSelector('.corner[aria-label="Posterior of k, c, each alone and in pairs"]');
@@ -74,7 +94,7 @@ test('all panels follow a record that polyest streams', options, async () => {
     assert.ok(await inked(page, canvas) > 2000, `${canvas} is drawn`);
   }
   await picture(page, 'real-light-1280');
-  assert.deepEqual(await end, [0, null]);
+  assert.deepEqual(await feeding.end, [0, null]);
   await says(page, '1000 samples');
   // As `polyest estimate` prints them.
   await says(page, '41.2976');
