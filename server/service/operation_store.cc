@@ -22,21 +22,35 @@ constexpr std::chrono::seconds kRetryLater{1};
 }  // namespace
 
 // Takes up one of the tenant's places. The work holds it in the queue and until it has ended,
-// because its request takes memory as long, whether its operation has been forgotten or not.
+// because its request takes memory as long, whether its operation has been forgotten or not. The
+// store waits for the object itself, which the work holds until nothing is left of it.
 class OperationStore::Place {
  public:
   // Called with the store's mutex held; the destructor without.
   Place(OperationStore& store, std::string tenant) : store_(store), tenant_(std::move(tenant)) {
     ++store_.places_[tenant_];
+    ++store_.holders_;
   }
-  ~Place() { store_.Leave(tenant_); }
+  ~Place() {
+    const std::lock_guard lock(store_.mutex_);
+    Leave();
+    --store_.holders_;
+    store_.left_.notify_all();
+  }
   const std::string& tenant() const { return tenant_; }
+  // Gives the place back, unless that has been done. Called with the store's mutex held.
+  void Leave() {
+    if (std::exchange(left_, true)) return;
+    const auto place = store_.places_.find(tenant_);
+    if (--place->second == 0) store_.places_.erase(place);
+  }
   Place(const Place&) = delete;
   Place& operator=(const Place&) = delete;
 
  private:
   OperationStore& store_;
   const std::string tenant_;
+  bool left_ = false;
 };
 
 // Holds one operation. The work shares its ownership, so that an operation may be forgotten while
@@ -139,7 +153,7 @@ OperationStore::OperationStore(const OperationLimits& limits, WallClock wall_clo
 OperationStore::~OperationStore() {
   CancelAll();
   std::unique_lock lock(mutex_);
-  left_.wait(lock, [this] { return places_.empty(); });
+  left_.wait(lock, [this] { return holders_ == 0; });
 }
 
 void OperationStore::CancelAll() {
@@ -148,13 +162,6 @@ void OperationStore::CancelAll() {
 }
 
 void OperationStore::Cancel(Entry& entry) { entry.Cancel(wall_clock_(), now_()); }
-
-void OperationStore::Leave(const std::string& tenant) {
-  const std::lock_guard lock(mutex_);
-  const auto place = places_.find(tenant);
-  if (--place->second == 0) places_.erase(place);
-  left_.notify_all();
-}
 
 void OperationStore::ForgetOld() {
   const Clock::time_point oldest = now_() - limits_.kept_for;
@@ -214,12 +221,12 @@ absl::StatusOr<v1::Operation> OperationStore::Start(const std::string& tenant,
       absl::StrCat("operations/", limits_.prefix, MakeRequestId()), method, wall_clock_(), now_());
   POLYEST_ASSIGN_OR_RETURN(const Job job, make_job(entry->result()));
   Key key;
-  std::shared_ptr<const Place> place;
+  std::shared_ptr<Place> place;
   {
     const std::lock_guard lock(mutex_);
     ForgetOld();
     POLYEST_RETURN_IF_ERROR(MakeRoom(tenant));
-    place = std::make_shared<const Place>(*this, tenant);
+    place = std::make_shared<Place>(*this, tenant);
     key = {tenant, ++started_};
     entries_[key] = entry;
   }
@@ -232,14 +239,16 @@ absl::StatusOr<v1::Operation> OperationStore::Start(const std::string& tenant,
   return accepted;
 }
 
-void OperationStore::Run(const std::shared_ptr<Entry>& entry,
-                         const std::shared_ptr<const Place>& place, const UnaryCall::Work& work) {
+void OperationStore::Run(const std::shared_ptr<Entry>& entry, const std::shared_ptr<Place>& place,
+                         const UnaryCall::Work& work) {
   if (!entry->Begin()) return;
   const CallStop call_stop(entry->token(), limits_.max_computing);
   const Stop stop = call_stop.Begin();
   const auto finish = [this, entry, place, call_stop](const absl::Status& outcome) {
-    entry->End(call_stop.Name(outcome), wall_clock_(), now_());
+    // Whoever sees the end may start another operation at once, and sees no result too many.
     const std::lock_guard lock(mutex_);
+    entry->End(call_stop.Name(outcome), wall_clock_(), now_());
+    place->Leave();
     BoundResults(place->tenant());
   };
   const absl::Status status = Guarded([&] { return work(stop, entry->stop_source(), finish); });

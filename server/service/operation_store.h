@@ -85,9 +85,8 @@ class OperationStore {
   absl::StatusOr<Entries::iterator> Find(const std::string& tenant, const std::string& name);
   void Cancel(Entry& entry);
 
-  void Run(const std::shared_ptr<Entry>& entry, const std::shared_ptr<const Place>& place,
+  void Run(const std::shared_ptr<Entry>& entry, const std::shared_ptr<Place>& place,
            const UnaryCall::Work& work);
-  void Leave(const std::string& tenant);
 
   const OperationLimits limits_;
   const WallClock wall_clock_;
@@ -96,6 +95,7 @@ class OperationStore {
   std::condition_variable left_;
   Entries entries_;
   std::map<std::string, size_t> places_;  // taken up by work, by tenant; none is 0
+  size_t holders_ = 0;                    // number of Place objects
   int64_t started_ = 0;
 };
 

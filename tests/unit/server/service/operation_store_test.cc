@@ -109,6 +109,17 @@ TEST_F(OperationStoreTest, CountsWhatIsCancelledOrDeletedUntilItLeavesTheQueue) 
   EXPECT_TRUE(Start().ok());
 }
 
+TEST_F(OperationStoreTest, GivesAPlaceBackWithTheEndThoughItsTaskIsStillThere) {
+  const auto first = Start(), second = Start();
+  for (Task& task : queue_) task();
+  EXPECT_EQ(StateOf(first->name()), v1::Operation::SUCCEEDED);
+  const auto third = Start();
+  EXPECT_TRUE(third.ok()) << third.status();
+  queue_.erase(queue_.begin(), queue_.begin() + 2);
+  EXPECT_TRUE(Start().ok());
+  EXPECT_TRUE(absl::IsResourceExhausted(Start().status()));
+}
+
 TEST_F(OperationStoreTest, LeavesWhatIsDoneAsItIs) {
   const auto failed = Start("a", absl::InvalidArgumentError("uncertain: none"));
   RunAll();
