@@ -11,6 +11,7 @@
 
 #include <chrono>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -143,8 +144,15 @@ class CallInterceptor final : public grpc::experimental::Interceptor {
   // Notes the session that a message names. Every message of the services is a protobuf message; it
   // is null when the stream has ended.
   void NoteSession(const void* message) {
-    if (message == nullptr || !session_.empty()) return;
+    if (message == nullptr) return;
+    const std::lock_guard lock(mutex_);
+    if (!session_.empty()) return;
     session_ = SessionNamed(*static_cast<const google::protobuf::Message*>(message));
+  }
+
+  std::string Session() const {
+    const std::lock_guard lock(mutex_);
+    return session_;
   }
 
   void OnEnd(const grpc::Status& status) {
@@ -179,7 +187,7 @@ class CallInterceptor final : public grpc::experimental::Interceptor {
   }
 
   LogFields Described(const grpc::Status& status, const LoggedCaller& caller) const {
-    return {{"request", id_},          {"method", method_},     {"session", session_},
+    return {{"request", id_},          {"method", method_},     {"session", Session()},
             {"tenant", caller.tenant}, {"caller", caller.name}, {"peer", caller.peer},
             {"code", CodeName(status)}};
   }
@@ -204,6 +212,8 @@ class CallInterceptor final : public grpc::experimental::Interceptor {
                              call_.type() == ServerRpcInfo::Type::CLIENT_STREAMING;
   const Clock::time_point begin_ = Clock::now();
   std::string id_;
+  // A stream may end on one thread while its first message arrives on another.
+  mutable std::mutex mutex_;
   std::string session_;
 };
 
