@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <signal.h>
 #include <spawn.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -61,8 +62,12 @@ void DaemonProcess::Signal(int number) { POLYEST_CHECK(kill(pid_, number) == 0);
 
 int DaemonProcess::Wait() {
   int status = 0;
-  POLYEST_CHECK(waitpid(pid_, &status, 0) == pid_);
+  rusage used{};
+  POLYEST_CHECK(wait4(pid_, &status, 0, &used) == pid_);
   pid_ = -1;
+  for (const timeval& time : {used.ru_utime, used.ru_stime}) {
+    computed_s_ += static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
+  }
   return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
 }
 

@@ -30,12 +30,15 @@ class DaemonProcess {
   pid_t pid() const { return pid_; }
   // Returns the exit status, or −(signal) if a signal ended the daemon.
   int Wait();
+  // Returns the processor time that the daemon has used until Wait returned, in seconds.
+  double computed_s() const { return computed_s_; }
   // Returns everything that the daemon has written to stderr so far.
   std::string Errors() const;
 
  private:
   TestFolder data_;
   pid_t pid_ = -1;
+  double computed_s_ = 0;
   FILE* output_ = nullptr;
   FILE* errors_ = nullptr;
 };

@@ -119,8 +119,12 @@ TEST_F(NoDrainTest, EndsALongComputation) {
   ASSERT_EQ(operation.state(), v1::Operation::RUNNING);
   daemon_.Signal(SIGTERM);
   EXPECT_EQ(daemon_.Wait(), 0);
-  EXPECT_THAT(daemon_.Errors(), HasSubstr("[info] stopped"));
-  EXPECT_THAT(daemon_.Errors(), ::testing::Not(HasSubstr("went on after they were cancelled")));
+  const std::string log = daemon_.Errors();
+  if (log.find("[info] stopped\n") != std::string::npos) return;
+  // On a busy machine the computation may not come to look at its stop within the three seconds
+  // that the daemon waits. One that does not look at it computes all that time.
+  EXPECT_THAT(log, HasSubstr("[warning] stopped without computations that went on"));
+  EXPECT_LT(daemon_.computed_s(), 2) << log;
 }
 
 // Limits the size of the files of programs that are started before it is lifted (ulimit -f).
