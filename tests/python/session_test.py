@@ -5,6 +5,7 @@ import os
 import select
 import subprocess
 import sys
+import threading
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,6 +14,7 @@ import pytest
 import polyest
 from conftest import TRUTH
 from polyest._proto.v1 import estimate_pb2
+from polyest._stream import MeasurementStream
 from polyest.io import Batch, Recording
 from polyest.results import history
 from rig import wait_for
@@ -61,8 +63,7 @@ def test_estimates_end_with_the_last_batch(client, problem, rows):
 
 
 def test_a_session_without_rows_has_no_estimates(client, problem):
-    with client.session("empty", problem) as session:
-        assert list(session.estimates()) == []
+    assert list(client.session("empty", problem).estimates()) == []
 
 
 def test_an_observer_follows_a_writer(client, problem, rows):
@@ -112,6 +113,33 @@ def test_an_exception_of_on_estimate_is_raised_by_a_later_call(client, problem, 
     assert session.info().sample_count == 40 and not session.info().has_writer
 
 
+class Interrupted(MeasurementStream):
+    """Tells an estimate, on a thread of its own, while `check` takes what has been raised."""
+
+    telling = None
+
+    @property
+    def _raised(self):
+        found = self.kept
+        if self.telling is None:
+            self.telling = threading.Thread(target=self._tell, args=(broken, None))
+            self.telling.start()
+            self.telling.join(0.2)  # it waits for `check`
+        return found
+
+    @_raised.setter
+    def _raised(self, error):
+        self.kept = error
+
+
+def test_an_exception_that_on_estimate_raises_meanwhile_is_raised_by_the_next_call():
+    stream = Interrupted(SimpleNamespace(left_streams={}), "sessions/any", polyest.StreamOptions())
+    stream.check()
+    stream.telling.join()
+    with pytest.raises(ArithmeticError):
+        stream.check()
+
+
 def test_on_estimate_may_ask_the_session(client, problem, rows):
     asked = []
 
@@ -122,8 +150,7 @@ def test_on_estimate_may_ask_the_session(client, problem, rows):
             with pytest.raises(polyest.FailedPrecondition, match="^on_estimate must not write"):
                 write()
 
-    session = client.session("asked", problem, on_estimate=ask)
-    with session:
+    with client.session("asked", problem, on_estimate=ask) as session:
         for first in range(0, 200, 20):
             session.append(rows(first, first + 20))
     assert asked[-1] == (200, 200)

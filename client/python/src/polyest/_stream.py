@@ -108,13 +108,15 @@ class MeasurementStream:
         try:
             on_estimate(estimate)
         except BaseException as error:
-            self._raised = self._raised or error
+            with self.changed:
+                self._raised = self._raised or error
         finally:
             self._telling = None
 
     def check(self) -> None:
         """Raises what `on_estimate` has raised, once."""
-        error, self._raised = self._raised, None
+        with self.changed:
+            error, self._raised = self._raised, None
         if error is not None:
             raise error
 
