@@ -172,10 +172,13 @@ void MeasurementFlow::Advance() {
   if (finished_ || reactor_ == nullptr) return;
   if (!writing_ && !outbox_.empty() && outbox_.front().sequence <= kept_) {
     writing_ = true;
-    // The next response, if it is ready, goes into the same packet.
+    // The next response, if it is ready, goes into the same packet. The first one does not wait for
+    // it: gRPC would keep that back, with the call's metadata, until the connection has something
+    // else to send, and says that it is written only then.
     grpc::WriteOptions options;
-    if (outbox_.size() > 1 && std::next(outbox_.begin())->sequence <= kept_)
+    if (has_written_ && outbox_.size() > 1 && std::next(outbox_.begin())->sequence <= kept_)
       options.set_buffer_hint();
+    has_written_ = true;
     reactor_->StartWrite(&outbox_.front().response, options);
   }
   StartLoading();

@@ -155,6 +155,7 @@ class MeasurementFlow final : public SessionObserver,
   Stage stage_ = Stage::kNone;
   bool reading_ = false;
   bool writing_ = false;
+  bool has_written_ = false;  // whether a write has begun
   bool taking_ = false;
   bool computing_ = false;
   bool half_closed_ = false;

@@ -2,8 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <deque>
 #include <future>
 #include <latch>
+#include <mutex>
 #include <semaphore>
 #include <thread>
 
@@ -33,6 +35,14 @@ class Peer final : public grpc::ServerCallbackReaderWriter<Request, Response> {
     asked_.release();
     return true;
   }
+  // Waits for the next write. Returns whether it may wait for the one after it.
+  bool NextWriteMayWait() {
+    written_.acquire();
+    const std::lock_guard lock(mutex_);
+    const bool may_wait = buffered_.front();
+    buffered_.pop_front();
+    return may_wait;
+  }
   grpc::StatusCode AwaitEnd() { return finished_.get_future().get(); }
 
   void SendInitialMetadata() override {}
@@ -40,7 +50,12 @@ class Peer final : public grpc::ServerCallbackReaderWriter<Request, Response> {
     request_ = request;
     asked_.release();
   }
-  void Write(const Response*, grpc::WriteOptions) override {
+  void Write(const Response*, grpc::WriteOptions options) override {
+    {
+      const std::lock_guard lock(mutex_);
+      buffered_.push_back(options.get_buffer_hint());
+    }
+    written_.release();
     EXPECT_TRUE(writing_.Submit("", [this] { stream_.OnWriteDone(true); }).ok());
   }
   void WriteAndFinish(const Response*, grpc::WriteOptions, grpc::Status) override {}
@@ -53,6 +68,9 @@ class Peer final : public grpc::ServerCallbackReaderWriter<Request, Response> {
   MeasurementStream& stream_;
   Request* request_ = nullptr;
   std::counting_semaphore<> asked_{0};
+  std::counting_semaphore<> written_{0};
+  std::mutex mutex_;
+  std::deque<bool> buffered_;  // whether each write that has not been awaited may wait
   std::promise<grpc::StatusCode> finished_;
   Executor writing_{{.threads_per_lane = 1, .threads = 1, .capacity = 10, .capacity_per_lane = 10}};
 };
@@ -146,6 +164,33 @@ TEST_F(MeasurementStreamTest, TakesBatchesOfASessionInMemoryWhileOthersCompute) 
   const auto session = sessions_->All().front();
   while (session->place().sequence < 1) std::this_thread::yield();
   go_on.count_down();
+  stream->OnCancel();
+  EXPECT_EQ(peer.AwaitEnd(), grpc::StatusCode::CANCELLED);
+  stream->OnDone();
+}
+
+// gRPC keeps back a first response that may wait for another one, with the call's metadata, until
+// the connection has something else to send.
+TEST_F(MeasurementStreamTest, LetsAResponseWaitForTheNextButNotItsFirst) {
+  ServiceContext context = Context();
+  auto* const stream = new MeasurementStream(context, call_);
+  Peer peer(*stream);
+  const auto session = sessions_->All().front();
+  for (const int64_t sequence : {1, 2}) {
+    // The estimate is there before the acknowledgement may be sent.
+    journal_.Hold();
+    Request request = Batch(sequence);
+    request.mutable_estimates()->set_only_last(false);
+    request.mutable_estimates()->set_batch_count(1);
+    peer.Give(request);
+    while (session->Describe().activity().estimate_count() < sequence) std::this_thread::yield();
+    std::promise<void> computed;
+    ASSERT_TRUE(session->strand().Submit([&] { computed.set_value(); }, Admission::kAlways).ok());
+    computed.get_future().wait();
+    journal_.Release();
+    EXPECT_EQ(peer.NextWriteMayWait(), sequence > 1);
+    EXPECT_FALSE(peer.NextWriteMayWait());
+  }
   stream->OnCancel();
   EXPECT_EQ(peer.AwaitEnd(), grpc::StatusCode::CANCELLED);
   stream->OnDone();
