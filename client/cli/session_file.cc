@@ -2,6 +2,7 @@
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
+#include <google/protobuf/util/delimited_message_util.h>
 #include <zlib.h>
 
 #include <algorithm>
@@ -17,6 +18,7 @@ namespace polyest::internal {
 namespace {
 
 constexpr char kFirstLine[] = "polyest session 2\n";
+constexpr char kFirstLineBefore[] = "polyest session 1\n";
 constexpr size_t kLineBytes = sizeof(kFirstLine) - 1;
 constexpr size_t kNumberBytes = 4;
 
@@ -83,7 +85,10 @@ absl::StatusOr<std::unique_ptr<SessionFileReader>> SessionFileReader::Open(
     return absl::InvalidArgumentError(
         absl::StrFormat("%s: cannot be read: %s", file, std::strerror(errno)));
   }
-  if (ReadBytes(reader->in_, kLineBytes) != kFirstLine) {
+  const std::string line = ReadBytes(reader->in_, kLineBytes);
+  if (line == kFirstLineBefore) {
+    reader->unchecked_ = std::make_unique<google::protobuf::io::IstreamInputStream>(&reader->in_);
+  } else if (line != kFirstLine) {
     return absl::InvalidArgumentError(
         absl::StrFormat("%s: is not a session file written by polyest export", file));
   }
@@ -94,9 +99,22 @@ absl::Status SessionFileReader::Error(const std::string& what) const {
   return absl::InvalidArgumentError(absl::StrFormat("%s: record %d %s", file_, record_, what));
 }
 
+absl::StatusOr<std::optional<v1::SessionRecord>> SessionFileReader::ReadUnchecked() {
+  v1::SessionRecord record;
+  if (google::protobuf::util::ParseDelimitedFromZeroCopyStream(&record, unchecked_.get(),
+                                                               &ended_)) {
+    return record;
+  }
+  if (!ended_) return Error("is cut off or damaged");
+  record.Clear();
+  record.mutable_end();
+  return record;
+}
+
 absl::StatusOr<std::optional<v1::SessionRecord>> SessionFileReader::Read() {
   if (ended_) return std::nullopt;
   ++record_;
+  if (unchecked_ != nullptr) return ReadUnchecked();
   const std::optional<uint32_t> length = ReadNumber(in_);
   const std::optional<uint32_t> checksum = ReadNumber(in_);
   const std::string encoded = length ? ReadBytes(in_, *length) : "";

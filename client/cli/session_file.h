@@ -3,8 +3,11 @@
 // Writes and reads session files, for `polyest export` and `polyest import`. A file has a first
 // line that identifies its kind and then polyest.v1.SessionRecord messages, each after its length
 // and its CRC-32, which are numbers of four bytes, the lowest first. The last message is the end.
+// Files of the version before are read, too: they have messages after their lengths as protobuf
+// delimits them, and neither checksums nor an end.
 
 #include <absl/status/statusor.h>
+#include <google/protobuf/io/zero_copy_stream_impl.h>
 
 #include <cstdint>
 #include <fstream>
@@ -44,12 +47,15 @@ class SessionFileReader {
 
  private:
   explicit SessionFileReader(const std::string& file) : file_(file), in_(file, std::ios::binary) {}
+  absl::StatusOr<std::optional<v1::SessionRecord>> ReadUnchecked();
   absl::Status Error(const std::string& what) const;
 
   const std::string file_;
   std::ifstream in_;
   int64_t record_ = 0;  // the number of the record read last, from 1
   bool ended_ = false;
+  // Set for a file of the version before.
+  std::unique_ptr<google::protobuf::io::IstreamInputStream> unchecked_;
 };
 
 }  // namespace polyest::internal

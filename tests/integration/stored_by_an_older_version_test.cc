@@ -2,13 +2,13 @@
 // journal, `stored/session.polyest` its command's export, and `stored/estimate.json` its last
 // estimate, of 200 rows of client/examples/oscillator.csv in four batches.
 
-#include <google/protobuf/util/delimited_message_util.h>
-
 #include <filesystem>
 #include <fstream>
 #include <optional>
 #include <sstream>
 
+#include "client/cli/session_file.h"
+#include "polyest/client.h"
 #include "proto/wire/json/json_format.h"
 #include "tests/integration/daemon_fixture.h"
 
@@ -23,10 +23,10 @@ class StoredByAnOlderVersionTest : public testing::Test {
  protected:
   void Serve(const std::string& folder) {
     daemon_.emplace(std::vector<std::string>{"--listen", "127.0.0.1:0", "--data-dir", folder});
-    const std::string address = daemon_->ReadAddress();
-    ASSERT_FALSE(address.empty()) << daemon_->Errors();
+    address_ = daemon_->ReadAddress();
+    ASSERT_FALSE(address_.empty()) << daemon_->Errors();
     sessions_ = v1::SessionService::NewStub(
-        grpc::CreateChannel(address, grpc::InsecureChannelCredentials()));
+        grpc::CreateChannel(address_, grpc::InsecureChannelCredentials()));
   }
 
   // Expects the session to be unchanged, to go on, and to give its former estimate. Rounding
@@ -74,6 +74,7 @@ class StoredByAnOlderVersionTest : public testing::Test {
 
   const TestFolder folder_;
   std::optional<DaemonProcess> daemon_;
+  std::string address_;
   std::unique_ptr<v1::SessionService::Stub> sessions_;
 };
 
@@ -96,23 +97,12 @@ TEST_F(StoredByAnOlderVersionTest, LoadsFromItsJournal) {
 
 TEST_F(StoredByAnOlderVersionTest, ImportsWhatItHasExported) {
   Serve(folder_.path());
-  std::ifstream in(Stored("session.polyest"), std::ios::binary);
-  std::string first_line;
-  std::getline(in, first_line);
-  google::protobuf::io::IstreamInputStream input(&in);
-  grpc::ClientContext context;
-  v1::Session imported;
-  const auto writer = sessions_->ImportSession(&context, &imported);
-  v1::ImportSessionRequest request;
-  while (google::protobuf::util::ParseDelimitedFromZeroCopyStream(request.mutable_record(), &input,
-                                                                  nullptr)) {
-    writer->Write(request);
-    request.Clear();
-  }
-  writer->WritesDone();
-  const grpc::Status status = writer->Finish();
-  ASSERT_TRUE(status.ok()) << status.error_message();
-  EXPECT_EQ(imported.name(), "sessions/stored");
+  const auto reader = SessionFileReader::Open(Stored("session.polyest"));
+  ASSERT_TRUE(reader.ok()) << reader.status();
+  Client client(address_);
+  const auto imported = client.ImportSession("", [&] { return (*reader)->Read(); });
+  ASSERT_TRUE(imported.ok()) << imported.status();
+  EXPECT_EQ(imported->name(), "sessions/stored");
   ExpectTheSameEstimate();
 }
 

@@ -1,6 +1,7 @@
 """Session files, as `polyest export` writes them.
 
-A line, then records, each after its length and its CRC-32; the last record is the end.
+A line, then records, each after its length and its CRC-32; the last record is the end. Files of the
+version before, which have neither checksums nor an end, are read, too.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from polyest._proto.v1 import session_service_pb2
 from polyest.errors import InvalidInput
 
 _FIRST_LINE = b"polyest session 2\n"
+_FIRST_LINE_BEFORE = b"polyest session 1\n"
 _NUMBER = struct.Struct("<I")
 _BEFORE_RECORD = struct.Struct("<II")  # length, CRC-32
 
@@ -61,7 +63,11 @@ def read(file: Union[str, os.PathLike[str]]) -> Iterator[session_service_pb2.Ses
     """Yields the records of a file. Raises InvalidInput if it is none, damaged or cut short."""
     # A number is no path: `open` takes it for a descriptor and closes it in the end.
     with open(os.fspath(file), "rb") as source:
-        if source.readline(len(_FIRST_LINE)) != _FIRST_LINE:
+        first_line = source.readline(len(_FIRST_LINE))
+        if first_line == _FIRST_LINE_BEFORE:
+            yield from _read_unchecked(os.fspath(file), source)
+            return
+        if first_line != _FIRST_LINE:
             raise InvalidInput(f"{os.fspath(file)}: is not a session file written by an export")
         for number in itertools.count(1):
             length = _read_number(source)
@@ -82,6 +88,28 @@ def read(file: Union[str, os.PathLike[str]]) -> Iterator[session_service_pb2.Ses
             yield record
             if ended:
                 return
+
+
+def _read_unchecked(file: str, source: BinaryIO) -> Iterator[session_service_pb2.SessionRecord]:
+    """Yields the records of a file of the version before: each after its length, a varint."""
+    for number in itertools.count(1):
+        length, shift = 0, 0
+        for byte in iter(lambda: source.read(1), b""):
+            length |= (byte[0] & 0x7f) << shift
+            shift += 7
+            if byte[0] < 0x80 or shift > 63:
+                break
+        else:
+            if shift == 0:
+                break
+        encoded = source.read(length)
+        try:
+            if len(encoded) < length:
+                raise message.DecodeError("cut off")
+            yield session_service_pb2.SessionRecord.FromString(encoded)
+        except message.DecodeError:
+            raise InvalidInput(f"{file}: record {number} is cut off or damaged") from None
+    yield session_service_pb2.SessionRecord(end=session_service_pb2.SessionRecord.End())
 
 
 def _read_number(source: BinaryIO) -> Optional[int]:

@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "core/estimator/estimator_access.h"
+#include "core/estimator/studies/information_gain.h"
 #include "core/estimator/studies/sample_times.h"
 #include "core/model/equations/equation_model.h"
 #include "polyest/catalogue.h"
@@ -133,10 +134,15 @@ TEST(ExperimentDesign, ComparesOutputsAloneAndTogether) {
 }
 
 TEST(ExperimentDesign, AssumesOnePercentOfTheRangeForNoiseThatIsNotKnown) {
-  // The range of v = a is between −5 and 7, as 64 draws show it to a twentieth.
+  // The range of v = a is four standard deviations of 64 draws of it, 12 but for their scatter.
   const ExperimentDesign design = Design(Line(), 2, 0.5);
   ASSERT_EQ(design.outputs.size(), 2u);
-  EXPECT_NEAR(design.outputs[1].noise, 0.12, 0.05 * 0.12);
+  const ResolvedProblem problem = Resolve(Line());
+  const Vector a =
+      problem.prior().Mean()[1] + 3 * DrawTruths(problem.prior(), design.draws).col(1).array();
+  const double deviation = std::sqrt((a.array() - a.mean()).square().mean());
+  EXPECT_NEAR(design.outputs[1].noise, 0.01 * 4 * deviation, 1e-9);
+  EXPECT_NEAR(deviation, 3, 0.3);
 }
 
 TEST(ExperimentDesign, TakesAnOutputThatIsMeasuredAnywayOnce) {
