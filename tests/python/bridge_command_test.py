@@ -181,8 +181,9 @@ def test_the_example_s_rig_gets_estimates_back(example, client):
     bridge.send_signal(signal.SIGTERM)
     status, out, err = ended(bridge)
     assert status == 0, err
-    # The truth is 41.3; times are those of the arrival, which disturbs it a little.
-    assert abs(heard["Stiffness"] - 41.3) < 2
+    # The rig runs by the clock, so that what the estimate is worth depends on the machine's load:
+    # where frames come late, the force between them is not the straight line that it is taken for.
+    assert heard["Identified"] and 35 < heard["Stiffness"] < 47 and 0 < heard["StiffnessSd"] < 2
     assert "verdict" in out
     assert "failure" not in err
 
