@@ -3,8 +3,9 @@
 
     run.py POLYEST WORK [--maker FOLDER] [--quick] [--list] [CASE...]
 
-POLYEST is the command, WORK a folder for the cases. They are made by make_cases.py of FOLDER, by default
-shared/adversary beside the repository; without that folder nothing is run, and the exit status is 77.
+POLYEST is the command, WORK a folder for the cases, which is emptied before: a new one, an empty one, or one
+that this script has made. The cases are made by make_cases.py of FOLDER, by default shared/adversary beside the
+repository; without that folder nothing is run, and the exit status is 77.
 --quick takes the cases that need seconds, --list prints the rows for the table of tests/README.md.
 
 An answer is judged by the mean m and the standard deviation s of each parameter in the exact posterior:
@@ -36,6 +37,7 @@ MAKER = SOURCE.parent / "shared" / "adversary"
 DEBIAN_PYTHON = Path("/usr/bin/python3")
 PYTHON = str(DEBIAN_PYTHON) if DEBIAN_PYTHON.exists() else sys.executable
 SKIPPED = 77
+MARK = ".made-by-run.py"  # a file in folders that may be emptied
 CPU_SECONDS = 120
 WALL_SECONDS = 1200  # of a machine that is busy with something else
 GOOD = ("RIGHT", "HONEST")
@@ -107,8 +109,12 @@ def estimate(polyest, folder):
 
 def make_cases(maker, work, makers):
     """Makes the cases of these functions of make_cases.py, or all; returns their folders."""
+    mark = work / MARK
+    if work.is_dir() and any(work.iterdir()) and not mark.exists():
+        sys.exit(f"{work}: must be new, empty, or a folder that this script has made; it is left as it is")
     shutil.rmtree(work, ignore_errors=True)
     work.mkdir(parents=True)
+    mark.touch()
     # The cases are written beside the script.
     for name in ("make_cases.py", "lib.py"):
         shutil.copy(maker / name, work)

@@ -1,6 +1,8 @@
 #!/usr/bin/env python3
 """Shows that run.py tells good answers from bad ones."""
+import tempfile
 import unittest
+from pathlib import Path
 
 import run
 
@@ -47,6 +49,16 @@ class ComplaintTest(unittest.TestCase):
         self.assertIn("no longer SILENT", run.complaint("c", "RIGHT", known))
         self.assertIsNone(run.complaint("d", "HONEST", known))
         self.assertEqual(run.complaint("d", "SILENT", known), "d is SILENT")
+
+
+class WorkTest(unittest.TestCase):
+    def test_a_folder_that_the_script_has_not_made_is_left_as_it_is(self):
+        with tempfile.TemporaryDirectory() as folder:
+            kept = Path(folder) / "make_cases.py"
+            kept.write_text("")
+            with self.assertRaisesRegex(SystemExit, "it is left as it is"):
+                run.make_cases(Path(folder), Path(folder), [])
+            self.assertTrue(kept.exists())
 
 
 class TableTest(unittest.TestCase):
