@@ -111,6 +111,22 @@ absl::Status CheckIsOfThePrior(const ResolvedProblem& problem) {
   return CheckNoStreamedInput(problem);
 }
 
+absl::Status PropagateOver(const TimeGrid& grid, int64_t m, EnsemblePropagator& ensemble,
+                           absl::FunctionRef<absl::Status(int64_t, const Matrix&)> visit,
+                           const Stop& stop) {
+  const std::vector<double> times = grid.times_s();
+  const int64_t at_a_time = std::max<int64_t>(1, kColumnsAtATime / m);
+  for (int64_t first = 0; first < grid.count(); first += at_a_time) {
+    POLYEST_RETURN_IF_ERROR(stop.Check());
+    const int64_t count = std::min(at_a_time, grid.count() - first);
+    Matrix values(ensemble.points(), m * count);
+    POLYEST_RETURN_IF_ERROR(
+        ensemble.Advance({times.data() + first, static_cast<size_t>(count)}, values, stop));
+    POLYEST_RETURN_IF_ERROR(visit(first, values));
+  }
+  return absl::OkStatus();
+}
+
 absl::StatusOr<std::unique_ptr<PriorExpansion>> PriorExpansion::Make(const ResolvedProblem& problem,
                                                                      std::vector<int> outputs,
                                                                      int threads,
@@ -146,24 +162,19 @@ PriorExpansion::PriorExpansion(const ResolvedProblem& problem, std::vector<int> 
 absl::Status PriorExpansion::Run(const TimeGrid& grid,
                                  absl::FunctionRef<void(const ExpandedOutputs&)> visit,
                                  const Stop& stop) {
-  const std::vector<double> times = grid.times_s();
   const auto m = static_cast<int64_t>(outputs_.size());
-  const int64_t at_a_time = std::max<int64_t>(1, kColumnsAtATime / m);
-  for (int64_t first = 0; first < grid.count(); first += at_a_time) {
-    POLYEST_RETURN_IF_ERROR(stop.Check());
-    const int64_t count = std::min(at_a_time, grid.count() - first);
-    Matrix values(points_.rows(), m * count);
-    POLYEST_RETURN_IF_ERROR(
-        ensemble_.Advance({times.data() + first, static_cast<size_t>(count)}, values, stop));
+  const auto expand = [&](int64_t first, const Matrix& values) -> absl::Status {
     POLYEST_RETURN_IF_ERROR(LeaveOutFailed(stop));
     // c = A⁺ Y (10). A trajectory with an output beyond 1e100 has failed (output_limit.h), so that
     // squares of c do not overflow.
     Matrix coefficients(basis_->size(), values.cols());
     Vector residual_variance(values.cols());
     matrix_.Solve(values(kept_, Eigen::all), coefficients, residual_variance);
-    visit({first, count, Expansion(basis_, std::move(coefficients)), std::move(residual_variance)});
-  }
-  return absl::OkStatus();
+    visit({first, values.cols() / m, Expansion(basis_, std::move(coefficients)),
+           std::move(residual_variance)});
+    return absl::OkStatus();
+  };
+  return PropagateOver(grid, m, ensemble_, expand, stop);
 }
 
 Matrix PriorExpansion::Thetas() const {

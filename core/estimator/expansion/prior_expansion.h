@@ -51,6 +51,14 @@ absl::StatusOr<std::vector<int>> ChooseOutputs(const ResolvedProblem& problem,
 // provide it.
 absl::Status CheckIsOfThePrior(const ResolvedProblem& problem);
 
+// Propagates an ensemble of m outputs over the grid, and calls `visit` for successive stretches of
+// times that cover it in order, with the first time's number and the values, Q × m times: output i
+// at time first + k is column k·m + i. Ends with the first error of `visit`, or the status of a
+// stop request.
+absl::Status PropagateOver(const TimeGrid& grid, int64_t m, EnsemblePropagator& ensemble,
+                           absl::FunctionRef<absl::Status(int64_t, const Matrix&)> visit,
+                           const Stop& stop);
+
 // The expansions of m outputs at consecutive times. Output i at time first_time + k is column k·m +
 // i.
 struct ExpandedOutputs {

@@ -21,7 +21,8 @@
 //
 // The sums are in units of the noise with which they were taken. An expansion with a revised scale
 // rescales them; the path then is no longer the minimum, which changes the sums to second order
-// only.
+// only, as long as the scales differ by less than a quarter. Beyond that the runs are eliminated
+// again. Outside the region the polynomials say nothing, and the posterior is kept within it.
 //
 // Memory: O(S²) numbers for all ended runs together, and for each run its path to first order and
 // its spread, n_φ (1 + n_θ + n_φ) numbers, so that it can be eliminated again about another centre.

@@ -16,8 +16,6 @@ namespace {
 // slope out, and an error e of the trajectories e/h: 4 % of a phase of 100, and 2·10⁻⁸.
 constexpr double kHalfStep = 0.005;
 constexpr double kTolerance = 1e-10;
-// Number of times × outputs that are processed at once.
-constexpr int64_t kColumnsAtATime = 128;
 
 // The points of one draw: itself, then one below and one above it along each germ.
 class Stencil {
@@ -116,16 +114,11 @@ absl::StatusOr<ModelAtDraws> EvaluateAtDraws(const ResolvedProblem& problem,
   const Eigen::Index rows = grid.count() * m;
   ModelAtDraws model{xis, {}, ensemble.points(), {}};
   model.outputs.assign(static_cast<size_t>(xis.rows()), {Vector(rows), Matrix(rows, xis.cols())});
-  const std::vector<double> times = grid.times_s();
-  const int64_t at_a_time = std::max<int64_t>(1, kColumnsAtATime / m);
-  for (int64_t first = 0; first < grid.count(); first += at_a_time) {
-    POLYEST_RETURN_IF_ERROR(stop.Check());
-    const int64_t count = std::min(at_a_time, grid.count() - first);
-    Matrix values(ensemble.points(), m * count);
-    POLYEST_RETURN_IF_ERROR(
-        ensemble.Advance({times.data() + first, static_cast<size_t>(count)}, values, stop));
+  const auto take = [&](int64_t first, const Matrix& values) {
     TakeValues(stencil, values, first * m, model.outputs);
-  }
+    return absl::OkStatus();
+  };
+  POLYEST_RETURN_IF_ERROR(PropagateOver(grid, m, ensemble, take, stop));
   model.failures = ensemble.failures();
   POLYEST_RETURN_IF_ERROR(LeaveOutFailed(stencil, model));
   return model;
