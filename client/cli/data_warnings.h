@@ -30,7 +30,7 @@ void PrintWarnings(const std::vector<std::string>& warnings, std::ostream& out);
 class DataWarnings {
  public:
   // Each warning names `file` unless it is empty. Prints nothing for data that are refused, which
-  // the computation reports, and for a model that only the daemon has.
+  // the computation reports. The daemon is asked where it alone has the model.
   void Print(const v1::Problem& problem, const Place& place, const v1::Measurements& data,
              const std::string& file = "");
 

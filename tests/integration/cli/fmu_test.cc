@@ -126,6 +126,19 @@ TEST_F(FmuCommandTest, AnswersTheSameByADaemon) {
   EXPECT_EQ(stream.exit_status, 0) << stream.err;
 }
 
+TEST_F(FmuCommandTest, WarnsOfDataWhereOnlyTheDaemonHasTheModel) {
+  DaemonProcess daemon({"--fmu-dir", POLYEST_TEST_FMUS});
+  const std::string problem = File("noisy.json", R"({"model": {"fmu": "oscillator_me2"},
+      "uncertain": [{"name": "k", "uniform": {"lower": 31.584, "upper": 47.376}}],
+      "measured": [{"output": "x", "noise": {"absolute": 10}}]})");
+  const std::string late = File("late.csv", "t,x\n12.35,0.5\n12.40,0.6\n12.45,0.7\n");
+  const Finished here = Run({"estimate", problem, late, "--fmu-dir", POLYEST_TEST_FMUS});
+  const Finished there = Run({"estimate", problem, late, "--server", daemon.address()});
+  EXPECT_EQ(there.exit_status, here.exit_status) << there.err;
+  EXPECT_THAT(here.err, HasSubstr("warning: t"));
+  EXPECT_EQ(there.err, here.err);
+}
+
 TEST_F(FmuCommandTest, ADaemonOutlivesAnFmuThatCrashes) {
   DaemonProcess daemon({"--fmu-dir", POLYEST_TEST_FMUS});
   const std::string crash = File("crash.json", R"({"model": {"fmu": "faulty_cs2"},
