@@ -22,8 +22,8 @@ bool IsInFolder(const v1::Problem::Model& model);
 // Returns the columns of data for a problem with the units of its model.
 DataColumns DataColumnsFor(const v1::Problem& problem, const ModelLibrary& models,
                            const DataFileOptions& options);
-// Does the same with the models of a place. The units of an FMU that only a daemon has are those
-// that the daemon names.
+// Returns the columns with the units of the models of a place. The units of an FMU that only a
+// daemon has are those that the daemon names.
 absl::StatusOr<DataColumns> DataColumnsFor(const v1::Problem& problem, const Place& place,
                                            const DataFileOptions& options);
 

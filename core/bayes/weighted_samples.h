@@ -4,8 +4,8 @@
 
 #include <vector>
 
-#include "core/chaos/expansion.h"
 #include "core/common/types.h"
+#include "polyest/density.h"
 
 namespace polyest::internal {
 

@@ -46,7 +46,7 @@ class WindowSums {
   void EndRow(const std::vector<ChannelSums>& sums, int run, double time_s) {
     EndRow(sums, run, time_s, time_s);
   }
-  // Does the same for what counts as one row and lasts from `start_s` to `end_s`.
+  // Ends what counts as one row and lasts from `start_s` to `end_s`, in the same way.
   void EndRow(const std::vector<ChannelSums>& sums, int run, double start_s, double end_s);
 
   // Replaces the terms φ by others φ′ with φ ≈ Tᵀφ′, as MismatchSums::Substituted does: `t` is

@@ -57,14 +57,7 @@ class Estimator::Implementation {
   const ResolvedProblem& problem() const { return problem_; }
   int64_t rows_appended() const { return store_->rows(); }
   int64_t rows_processed() const { return mixture_->rows_taken(); }
-  int64_t memory_bytes() const {
-    int64_t bytes = 0;
-    for (size_t i = 0; i < mixture_->size(); ++i) {
-      const MixtureComponent& component = mixture_->component(i);
-      bytes += BytesOf(component.problem(), component.expansion());
-    }
-    return bytes;
-  }
+  int64_t memory_bytes() const { return BytesOf(*mixture_) + search_.memory_bytes(); }
 
   absl::Status Append(const Samples& samples);
   absl::Status Process(const Stop& stop);

@@ -51,6 +51,15 @@ int64_t BytesOf(const ResolvedProblem& problem, const RegionalExpansion& expansi
                 static_cast<double>(problem.channels()), StatesOf(problem)});
 }
 
+int64_t BytesOf(const ComponentMixture& mixture) {
+  int64_t bytes = 0;
+  for (size_t i = 0; i < mixture.size(); ++i) {
+    const MixtureComponent& component = mixture.component(i);
+    bytes += BytesOf(component.problem(), component.expansion());
+  }
+  return bytes;
+}
+
 int64_t ExpectedBytes(const ResolvedProblem& problem) {
   const ExpansionOptions& options = problem.problem().expansion;
   const int dimension = problem.dimension();

@@ -7,6 +7,7 @@
 #include "core/common/status.h"
 #include "core/estimator/expansion/expansion_design.h"
 #include "core/estimator/expansion/likelihood_power.h"
+#include "core/estimator/memory_use.h"
 
 namespace polyest::internal {
 namespace {
@@ -27,6 +28,8 @@ absl::Status SecondSearch::CheckState(const State& state, int64_t rows) {
   }
   return absl::DataLossError("the snapshot's looks for a better minimum cannot be of its rows");
 }
+
+int64_t SecondSearch::memory_bytes() const { return second_ ? BytesOf(*second_) : 0; }
 
 bool SecondSearch::IsDue(const Problem& problem, double misfit) const {
   if (!problem.expansion.adaptive || misfit < kMinMisfit) return false;
@@ -63,10 +66,12 @@ absl::StatusOr<bool> SecondSearch::Search(const ResolvedProblem& problem, const 
     if (problem.runs() > 1) {
       POLYEST_ASSIGN_OR_RETURN(first_run, problem.WithRuns(1));
     }
-    POLYEST_ASSIGN_OR_RETURN(
-        second_, ComponentMixture::OfPrior(
-                     first_run ? *first_run : problem, store, threads,
-                     {.misfit = misfit, .rows = state_.row, .in_tails = in_tails_}, stop));
+    auto begun = ComponentMixture::OfPrior(
+        first_run ? *first_run : problem, store, threads,
+        {.misfit = misfit, .rows = state_.row, .in_tails = in_tails_}, stop);
+    // The mixture that there is goes on where no other can begin.
+    if (absl::IsFailedPrecondition(begun.status())) return false;
+    POLYEST_ASSIGN_OR_RETURN(second_, std::move(begun));
   }
   const absl::Status taken = second_->TakeUpTo(state_.row, stop);
   if (!taken.ok() && !absl::IsFailedPrecondition(taken)) return taken;

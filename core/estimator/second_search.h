@@ -44,6 +44,8 @@ class SecondSearch {
     }
   };
   const State& state() const { return state_; }
+  // Returns about how many bytes of memory a search under way holds.
+  int64_t memory_bytes() const;
   // Returns DATA_LOSS if no search can have this state after so many rows.
   static absl::Status CheckState(const State& state, int64_t rows);
   void Restore(const State& state) { state_ = state; }

@@ -8,7 +8,7 @@
 namespace polyest::internal {
 
 struct RowProgress {
-  // The last step taken: it ends at end_s with the states in RowStates::end.
+  // The last step taken, which ends at end_s.
   double begin_s = 0;
   double end_s = 0;
   double length_s = 0;  // 0 before the first step

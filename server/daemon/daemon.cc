@@ -24,7 +24,6 @@
 #include "core/umbridge/open_models.h"
 #include "server/journal/memory_journal.h"
 #include "server/journal/sqlite_journal.h"
-#include "server/security/in_process_caller.h"
 #include "server/service/services.h"
 #include "server/telemetry/call_interceptor.h"
 #include "server/telemetry/process_info.h"

@@ -47,7 +47,7 @@ class CommitQueue {
   // Called once, from the writing thread, with OK when the write is on disk.
   using Done = std::function<void(const absl::Status&)>;
 
-  // Says what is done about a full disk, by the writing thread. Default: nothing.
+  // What the writing thread does about a full disk. Default: nothing.
   struct Room {
     // Returns with what writes that need room are refused before a commit, if at all.
     std::function<absl::Status(Database&)> check{};

@@ -28,8 +28,8 @@ absl::Status RestoreBackupSeals(SqliteDatabase& database, SessionSeals& seals);
 // one of another version; DATA_LOSS when it is no database.
 absl::StatusOr<JournalContents> CheckJournal(SqliteDatabase& database, const Stop& stop);
 
-// Does the same with a file that no daemon uses, and leaves it as it is. NOT_FOUND when there is no
-// such file; all errors name it.
+// Reads all of a file that no daemon uses, as CheckJournal does, and leaves it as it is. NOT_FOUND
+// when there is no such file; all errors name it.
 absl::StatusOr<JournalContents> CheckJournalFile(const std::string& file);
 
 }  // namespace polyest::internal

@@ -51,7 +51,7 @@ class PostgresNode {
   PostgresNode& operator=(const PostgresNode&) = delete;
 
   int64_t number() const { return number_; }
-  // Says at which address clients reach this node. `streams` returns the number of its open
+  // Makes known at which address clients reach this node. `streams` returns the number of its open
   // streams, to be shown.
   void Announce(const std::string& address, std::function<int64_t()> streams);
 

@@ -86,7 +86,7 @@ class SqliteJournal final : public SessionJournal {
   void ReadTenants(SqliteDatabase& database);
   // Returns the lane of the commit queue in which a session is written: its tenant's.
   std::string LaneOf(int64_t session) const;
-  // Says whether there is room on the disk for more than deletions, or how it is refused.
+  // Returns OK if there is room on the disk for more than deletions, else the refusal.
   absl::Status CheckDisk(SqliteDatabase& database);
   bool MakeRoom();
   void Maintain(std::stop_token stop);

@@ -4,6 +4,7 @@
 
 #include <utility>
 
+#include "core/common/check.h"
 #include "core/common/status.h"
 #include "server/execution/guarded.h"
 #include "server/service/status_mapping.h"
@@ -52,17 +53,24 @@ void ImportFlow::OnFirstMessageDue() {
 void ImportFlow::Take() {
   const absl::Status taken =
       Guarded([this] { return half_closed_ ? FinishImport() : TakeRequest(); });
-  std::unique_lock lock(mutex_);
-  if (!taken.ok() || half_closed_) End(taken);
-  if (end_) {
-    // The import is destroyed before the call ends, because the daemon may be destroyed at any
-    // moment after that; and without the mutex, because its destruction waits for the journal.
-    lock.unlock();
-    import_ = nullptr;
-    lock.lock();
-  }
+  const std::lock_guard lock(mutex_);
   working_ = false;
+  if (!taken.ok() || half_closed_) End(taken);
   Advance();
+}
+
+void ImportFlow::LeaveImport() {
+  working_ = true;
+  const absl::Status accepted = context_.executor.Submit(
+      lane_,
+      [flow = shared_from_this()] {
+        flow->import_ = nullptr;
+        const std::lock_guard lock(flow->mutex_);
+        flow->working_ = false;
+        flow->Advance();
+      },
+      Admission::kAlways);
+  POLYEST_CHECK(accepted.ok());
 }
 
 absl::Status ImportFlow::TakeRequest() {
@@ -104,14 +112,15 @@ void ImportFlow::Advance() {
     if (!std::exchange(reading_, true)) reactor_->StartRead(&request_);
     return;
   }
+  if (import_ != nullptr) {
+    LeaveImport();
+    return;
+  }
   finished_ = true;
   reactor_->Finish(ToGrpc(*end_));
 }
 
 void ImportFlow::OnDone() {
-  // A call that ends between two records leaves the import, and the executor may hold the flow for
-  // longer than there are sessions.
-  import_ = nullptr;
   const std::lock_guard lock(mutex_);
   reactor_ = nullptr;
 }

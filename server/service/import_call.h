@@ -40,6 +40,9 @@ class ImportFlow final : public Drainable, public std::enable_shared_from_this<I
   // The following are called with the mutex held.
   void End(const absl::Status& status);
   void Advance();
+  // Destroys the import on the executor, because that waits for the journal, and goes on to end the
+  // call: only then, because the daemon may be destroyed at any moment after that.
+  void LeaveImport();
 
   // The following run on the executor.
   void Take();

@@ -9,7 +9,6 @@
 #include "core/common/field_error.h"
 #include "core/common/status.h"
 #include "proto/wire/operations/names.h"
-#include "server/execution/guarded.h"
 #include "server/service/catch_up.h"
 #include "server/service/status_mapping.h"
 #include "server/service/stream_admission.h"

@@ -95,15 +95,17 @@ class OperationStore::Entry {
     EndNow(Stop(token()).Check(), time, now);
   }
 
-  v1::Operation Describe(bool with_result, Clock::time_point now) const {
-    const std::lock_guard lock(mutex_);
-    v1::Operation operation = operation_;
-    const std::chrono::duration<double> elapsed = end_.value_or(now) - begin_;
-    operation.set_elapsed_time_s(elapsed.count());
-    if (!with_result) operation.clear_result();
-    if (with_result && operation.state() == v1::Operation::SUCCEEDED) {
-      *operation.mutable_response() = result_;
-    }
+  // Returns the operation without its response or error.
+  v1::Operation Describe(Clock::time_point now) const {
+    v1::Operation operation = DescribeWithError(now);
+    operation.clear_result();
+    return operation;
+  }
+  // Returns the operation with its response or error. Others need not wait while a large response
+  // is copied: it does not change any more.
+  v1::Operation DescribeWithResult(Clock::time_point now) const {
+    v1::Operation operation = DescribeWithError(now);
+    if (operation.state() == v1::Operation::SUCCEEDED) *operation.mutable_response() = result_;
     return operation;
   }
 
@@ -120,6 +122,13 @@ class OperationStore::Entry {
   }
 
  private:
+  v1::Operation DescribeWithError(Clock::time_point now) const {
+    const std::lock_guard lock(mutex_);
+    v1::Operation operation = operation_;
+    const std::chrono::duration<double> elapsed = end_.value_or(now) - begin_;
+    operation.set_elapsed_time_s(elapsed.count());
+    return operation;
+  }
   // Called with the mutex held.
   void EndNow(const absl::Status& status, const google::protobuf::Timestamp& time,
               Clock::time_point now) {
@@ -230,7 +239,7 @@ absl::StatusOr<v1::Operation> OperationStore::Start(const std::string& tenant,
     key = {tenant, ++started_};
     entries_[key] = entry;
   }
-  const v1::Operation started = entry->Describe(/*with_result=*/false, now_());
+  const v1::Operation started = entry->Describe(now_());
   const absl::Status accepted =
       job.submit([this, entry, place, work = job.work] { Run(entry, place, work); });
   if (accepted.ok()) return started;
@@ -267,9 +276,13 @@ absl::StatusOr<OperationStore::Entries::iterator> OperationStore::Find(const std
 
 absl::StatusOr<v1::Operation> OperationStore::Get(const std::string& tenant,
                                                   const std::string& name) {
-  const std::lock_guard lock(mutex_);
-  POLYEST_ASSIGN_OR_RETURN(const auto found, Find(tenant, name));
-  return found->second->Describe(/*with_result=*/true, now_());
+  std::shared_ptr<const Entry> entry;
+  {
+    const std::lock_guard lock(mutex_);
+    POLYEST_ASSIGN_OR_RETURN(const auto found, Find(tenant, name));
+    entry = found->second;
+  }
+  return entry->DescribeWithResult(now_());
 }
 
 OperationStore::Page OperationStore::List(const std::string& tenant, int64_t after, size_t count) {
@@ -280,7 +293,7 @@ OperationStore::Page OperationStore::List(const std::string& tenant, int64_t aft
   for (auto one = entries_.upper_bound({tenant, after}); one != last; ++one) {
     page.more = page.operations.size() == count;
     if (page.more) break;
-    page.operations.push_back(one->second->Describe(/*with_result=*/false, now_()));
+    page.operations.push_back(one->second->Describe(now_()));
     page.last = one->first.second;
   }
   return page;
@@ -291,7 +304,7 @@ absl::StatusOr<v1::Operation> OperationStore::Cancel(const std::string& tenant,
   const std::lock_guard lock(mutex_);
   POLYEST_ASSIGN_OR_RETURN(const auto found, Find(tenant, name));
   Cancel(*found->second);
-  return found->second->Describe(/*with_result=*/false, now_());
+  return found->second->Describe(now_());
 }
 
 absl::Status OperationStore::Delete(const std::string& tenant, const std::string& name) {

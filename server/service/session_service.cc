@@ -1,6 +1,5 @@
 #include "core/common/status.h"
 #include "polyest/v1/session_service.grpc.pb.h"
-#include "proto/wire/convert/annotate.h"
 #include "proto/wire/operations/names.h"
 #include "proto/wire/operations/pages.h"
 #include "proto/wire/refusal/refusal.h"

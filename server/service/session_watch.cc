@@ -190,7 +190,6 @@ void WatchFlow::OnWritten(bool ok) {
 void WatchFlow::OnCancelled() {
   std::lock_guard lock(mutex_);
   if (passed_on_ != nullptr) return passed_on_->OnCancelled();
-  stop_source_.request_stop();
   End(absl::CancelledError("the call was cancelled"));
   pending_ = nullptr;
   prediction_.reset();
@@ -218,6 +217,7 @@ void WatchFlow::Drain() {
 
 void WatchFlow::End(const absl::Status& status) {
   if (!end_) end_ = status;
+  stop_source_.request_stop();
 }
 
 void WatchFlow::Advance() {

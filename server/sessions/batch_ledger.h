@@ -59,7 +59,7 @@ class BatchLedger {
   // tells of those that are kept all the same. With `anew`, whoever has seen the losses until now
   // must begin anew, too, because what he holds lacks batches.
   void Restart(const SessionPlace& place, bool anew = false);
-  // Does the same if the place is a later one and no batch is under way.
+  // Restarts from the place if it is a later one and no batch is under way.
   void Follow(const SessionPlace& place, bool anew);
   // Calls `done` when every batch up to `sequence` is kept, at once if all are; with the reason
   // when one of them is lost. If there were more losses since the caller saw `losses` of them,

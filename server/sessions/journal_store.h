@@ -37,8 +37,8 @@ class JournalStore final : public SampleStore {
   explicit JournalStore(const ResolvedProblem& problem, double reorder_window_s = 0,
                         RunCuts cuts = {});
 
-  // Says where the batches are kept: those of session `number` of `journal`, which must outlive the
-  // store.
+  // Sets where released batches are read again: in `journal`, which must outlive the store, as
+  // those of session `number`.
   void ReadFrom(const SessionJournal& journal, int64_t number);
   // Frees the memory of segments that consist of batches up to `sequence`; the journal must keep
   // these. Requires ReadFrom.
@@ -49,8 +49,8 @@ class JournalStore final : public SampleStore {
   absl::Status Append(const RowBlock& batch) override;
   // Goes on to the next batch without appending rows: all of its rows are held back or left out.
   void PassOver();
-  // Says, before the next batch is appended or passed over, what RowReorder::held_from is after it.
-  // Not needed if rows come in time order.
+  // Sets what RowReorder::held_from will be after the next batch, which is then appended or passed
+  // over. Not needed if rows come in time order.
   void SetHeldFrom(int64_t batch) { held_from_ = batch; }
   // Fails as SessionJournal::ReadBatches; DATA_LOSS if the journal has other rows than those
   // appended.

@@ -37,8 +37,9 @@ class SessionRegistry {
   // Returns the session of this full name; NOT_FOUND when there is none that this daemon knows.
   absl::StatusOr<std::shared_ptr<Session>> Get(const std::string& tenant,
                                                const std::string& name) const;
-  // Does the same for any journal: looks the session up if several daemons share the journal, and
-  // then waits for it. UNAVAILABLE, naming the owner, when it belongs to another daemon that lives.
+  // Returns the session of this full name, whichever daemon has it: where several share a journal,
+  // looks it up there, and waits for that. NOT_FOUND when there is none; UNAVAILABLE, naming the
+  // owner, when it belongs to another daemon that lives.
   absl::StatusOr<std::shared_ptr<Session>> Find(const std::string& tenant, const std::string& name);
   // Returns at most `count` sessions with names after `after`, in the order of their names.
   // Waits for the journal if several daemons share it.

@@ -89,7 +89,7 @@ RegionalExpansion::RegionalExpansion(const ResolvedProblem& problem, const Sampl
   TakeEndedRuns();
 }
 
-// Says how the sums of each channel are made into a likelihood.
+// Sets how the sums of each channel become a likelihood.
 void RegionalExpansion::BeginSums() {
   for (int c = 0; c < channels_; ++c) {
     const NoiseModel& model = problem_.problem().measured[static_cast<size_t>(c)].noise;

@@ -6,7 +6,6 @@
 
 #include "core/common/linear_algebra.h"
 #include "core/common/status.h"
-#include "core/estimator/expansion/likelihood_power.h"
 #include "core/estimator/expansion/reexpansion.h"
 #include "core/estimator/posterior/bisection.h"
 #include "core/estimator/posterior/least_linear.h"
@@ -58,7 +57,8 @@ bool MixtureComponent::MayLookForPieces() const {
   return true;
 }
 
-// Returns true when the particles and the cost on the expansion are in pieces.
+// Divides the component if the particles and the cost on the expansion are in pieces. Returns
+// whether it must be divided, for this reason or an earlier one.
 bool MixtureComponent::DivideIntoPieces(const RegionalExpansion& expansion,
                                         const Matrix& particles) {
   const Cost cost = expansion.MakeCost(problem_.problem().regularization);

@@ -9,7 +9,6 @@
 #include "core/common/status.h"
 #include "core/estimator/expansion/carry_over.h"
 #include "core/estimator/expansion/control_trajectories.h"
-#include "core/estimator/expansion/prior_prediction.h"
 #include "core/estimator/expansion/reexpansion.h"
 #include "core/estimator/expansion/rescaled.h"
 #include "core/estimator/posterior/misfit.h"

@@ -41,30 +41,31 @@ class Weighing {
     std::vector<double> evidences;
     for (const Weighed& one : weighed_) evidences.push_back(one.log_evidence);
     const std::vector<double> weights = WeightsOf(evidences);
-    double light = 0;
-    const double least = LeastWeight(weights);
-    for (size_t k = 0; k < weights.size(); ++k) {
-      if (weights[k] < least) {
-        light = std::max(light, weights[k]);
-        continue;
-      }
+    std::vector<size_t> order = HeaviestFirst(weights);
+    if (order.size() > most_) {
+      weighing.left_out = weights[order[most_]];
+      order.resize(most_);
+    }
+    std::ranges::sort(order);
+    for (const size_t k : order) {
       weighing.kept.push_back(k);
       weighing.weights.push_back(weights[k]);
       weighing.particles.push_back(std::move(weighed_[k].particles));
     }
-    if (least > kMinWeight) weighing.left_out = light;
     const double all = std::accumulate(weighing.weights.begin(), weighing.weights.end(), 0.0);
     for (double& weight : weighing.weights) weight /= all;
     return weighing;
   }
 
  private:
-  // The weight from which on a component is kept: kMinWeight, or what leaves no more than the most
-  // components allowed.
-  double LeastWeight(std::vector<double> weights) const {
-    if (weights.size() <= most_) return kMinWeight;
-    std::ranges::sort(weights, std::greater());
-    return std::max(kMinWeight, weights[most_ - 1]);
+  // Returns the components that have at least the least weight; of equal ones, the first first.
+  static std::vector<size_t> HeaviestFirst(const std::vector<double>& weights) {
+    std::vector<size_t> order;
+    for (size_t k = 0; k < weights.size(); ++k) {
+      if (weights[k] >= kMinWeight) order.push_back(k);
+    }
+    std::ranges::stable_sort(order, std::greater(), [&](size_t k) { return weights[k]; });
+    return order;
   }
 
   // Draws from the components in the order of the most that their evidence can be, until the rest

@@ -18,7 +18,7 @@ struct MixtureWeighing {
   std::vector<size_t> kept;       // indices of the requests, ascending; at least one
   std::vector<double> weights;    // weights of those kept, Σ = 1
   std::vector<Matrix> particles;  // of those kept, equally weighted, germ coordinates
-  double left_out = 0;            // share of those dropped for lack of room
+  double left_out = 0;            // largest weight of those dropped for lack of room
 };
 
 // Weighs the components and keeps at most the `most` heaviest. Takes one request per component, at

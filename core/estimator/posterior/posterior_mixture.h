@@ -17,7 +17,7 @@ struct AssessedMixture {
   std::vector<size_t> order;         // their indices among the requests; {0} for a single one
 };
 
-// Assesses the mixture. Takes one request per component, at least one, If a stop has left the
+// Assesses the mixture. Takes one request per component, at least one. If a stop has left the
 // components at different rows, their last weights are used. `left_out` is that of the last
 // weighing. Returns an error only on a stop request.
 absl::StatusOr<AssessedMixture> AssessMixture(std::vector<AssessmentRequest> requests,

@@ -11,7 +11,6 @@
 #include "core/common/check.h"
 #include "core/common/status.h"
 #include "core/estimator/expansion/search_domain.h"
-#include "core/estimator/posterior/noise_learning.h"
 
 namespace polyest::internal {
 namespace {

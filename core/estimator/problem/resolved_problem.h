@@ -67,7 +67,6 @@ class ResolvedProblem {
   // What is known of the runs before the first one whose parameters are in the problem; null if
   // there are none.
   const EndedRuns* ended_runs() const { return ended_runs_.get(); }
-  const std::shared_ptr<const EndedRuns>& shared_ended_runs() const { return ended_runs_; }
   void set_ended_runs(std::shared_ptr<const EndedRuns> ended) { ended_runs_ = std::move(ended); }
   // Returns the first row of the record that an expansion of this problem takes.
   int64_t first_row() const { return ended_runs_ ? ended_runs_->rows : 0; }

@@ -11,7 +11,6 @@
 #include "core/bayes/mismatch.h"
 #include "core/common/field_error.h"
 #include "core/common/status.h"
-#include "core/estimator/posterior/noise_learning.h"
 #include "core/estimator/record/known_inputs_store.h"
 #include "core/estimator/record/sample_checks.h"
 #include "core/estimator/studies/record_pass.h"

@@ -12,9 +12,9 @@
 #include "core/estimator/problem/validate_noise.h"
 #include "core/estimator/studies/information_gain.h"
 #include "core/estimator/studies/model_slopes.h"
-#include "core/estimator/studies/prior_propagation.h"
 #include "core/estimator/studies/sample_times.h"
 #include "core/model/list_names.h"
+#include "polyest/prior_propagation.h"
 
 namespace polyest::internal {
 namespace {

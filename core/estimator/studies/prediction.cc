@@ -11,7 +11,6 @@
 #include "core/bayes/population_cost.h"
 #include "core/bayes/weighted_samples.h"
 #include "core/chaos/collocation_points.h"
-#include "core/chaos/expansion.h"
 #include "core/common/field_error.h"
 #include "core/common/status.h"
 #include "core/estimator/expansion/prior_expansion.h"

@@ -75,7 +75,7 @@ absl::Status PropagationOptions::Validate() const {
   for (size_t i = 0; i < probabilities.size(); ++i) {
     if (probabilities[i] >= 0 && probabilities[i] <= 1) continue;
     return InvalidField(FieldPath{"probabilities", i},
-                        absl::StrFormat("%g must be above 0 and below 1", probabilities[i]));
+                        absl::StrFormat("%g must lie between 0 and 1", probabilities[i]));
   }
   if (density_bins < 0 || density_bins > kMaxDensityBins) {
     return InvalidField("density_bins", absl::StrFormat("%d must lie between 0 and %d",

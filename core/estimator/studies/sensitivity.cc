@@ -10,7 +10,7 @@
 #include "core/common/status.h"
 #include "core/estimator/expansion/prior_expansion.h"
 #include "core/estimator/problem/assumed_noise.h"
-#include "core/estimator/studies/prior_propagation.h"
+#include "polyest/prior_propagation.h"
 
 namespace polyest::internal {
 namespace {

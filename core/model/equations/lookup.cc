@@ -10,7 +10,6 @@
 #include "core/common/check.h"
 #include "core/common/field_error.h"
 #include "core/common/status.h"
-#include "core/model/equations/limits.h"
 
 namespace polyest::internal::equations {
 namespace {

@@ -13,8 +13,8 @@ namespace polyest::internal {
 // The message must be one that this program has made: all its fields have a form in JSON.
 std::string ToJson(const google::protobuf::Message& message, bool several_lines);
 
-// Does the same for a message of another program. INTERNAL if a field has no form in JSON, such as
-// a time beyond the year 9999.
+// Returns the JSON of a message of another program, as ToJson does. INTERNAL if a field has no form
+// in JSON, such as a time beyond the year 9999.
 absl::StatusOr<std::string> TryToJson(const google::protobuf::Message& message, bool several_lines);
 
 // Reads what ToJson writes into `message`. INVALID_ARGUMENT if the text is not JSON of its type.

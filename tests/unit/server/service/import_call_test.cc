@@ -33,6 +33,8 @@ class Reader final : public grpc::ServerCallbackReader<v1::ImportSessionRequest>
     *request_->mutable_record() = record;
     call_.OnReadDone(true);
   }
+  // Waits until the import asks for a record, which it is not given.
+  void Await() { asked_.acquire(); }
   // Waits until the import asks for a record, and ends the stream.
   void End() {
     asked_.acquire();
@@ -119,6 +121,26 @@ TEST_F(ImportCallTest, KeepsNothingWhenItIsCancelledWhileARecordIsTaken) {
   EXPECT_TRUE(journal_.ReadProblem(1).ok());
   import->OnCancel();
   journal_.Release();
+  EXPECT_EQ(finished.get_future().get(), grpc::StatusCode::CANCELLED);
+  import->OnDone();
+}
+
+TEST_F(ImportCallTest, KeepsNothingWhenItIsCancelledBetweenTwoRecords) {
+  ServiceContext context = Context();
+  auto* const import = new ImportCall(context, call_, &imported_);
+  std::promise<grpc::StatusCode> finished;
+  Reader reader(*import, [&](const grpc::Status& status) {
+    EXPECT_TRUE(absl::IsNotFound(journal_.ReadProblem(1).status()));
+    finished.set_value(status.error_code());
+  });
+  reader.Give(Head());
+  reader.Await();
+  std::promise<void> free;
+  EXPECT_TRUE(executor_.Submit("busy", [&] { free.get_future().wait(); }).ok());
+  import->OnCancel();
+  // The thread that cancels does not wait for the journal.
+  EXPECT_TRUE(journal_.ReadProblem(1).ok());
+  free.set_value();
   EXPECT_EQ(finished.get_future().get(), grpc::StatusCode::CANCELLED);
   import->OnDone();
 }
