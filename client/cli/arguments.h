@@ -17,21 +17,25 @@
 
 namespace polyest::internal {
 
-struct EstimateArguments {
+// A problem and its data, in files.
+struct ExperimentInput {
   Place place;
   std::string problem_file;
   std::string data_file;
   DataFileOptions data_options;
+};
+
+// An experiment, or a session of a daemon in its place.
+struct StudyInput : ExperimentInput {
+  std::string session;  // its id; empty: none
+};
+
+struct EstimateArguments : ExperimentInput {
   std::string plot_file;  // empty: none
   Format format = Format::kTable;
 };
 
-struct ExplainArguments {
-  Place place;
-  std::string problem_file;
-  std::string data_file;
-  DataFileOptions data_options;
-  std::string session;       // its id, in place of the files; empty: none
+struct ExplainArguments : StudyInput {
   bool no_remedies = false;  // whether remedies of residuals are left untried
 };
 
@@ -43,11 +47,7 @@ struct PropagateArguments {
   Format format = Format::kTable;
 };
 
-struct CostArguments {
-  Place place;
-  std::string problem_file;
-  std::string data_file;
-  DataFileOptions data_options;
+struct CostArguments : ExperimentInput {
   std::vector<std::string> parameters;
   int grid_points = 0;  // 0: the default
   Format format = Format::kJson;
@@ -103,12 +103,7 @@ struct DesignArguments {
   Format format = Format::kTable;
 };
 
-struct PosteriorArguments {
-  Place place;
-  std::string problem_file;
-  std::string data_file;
-  DataFileOptions data_options;
-  std::string session;  // its id, in place of the files; empty: none
+struct PosteriorArguments : StudyInput {
   int samples = 0;
   std::vector<double> probabilities;  // of the quantiles; empty: the default
   std::vector<std::string> joints;    // pairs of parameters, "k,c"
@@ -116,12 +111,7 @@ struct PosteriorArguments {
   Format format = Format::kTable;
 };
 
-struct FitArguments {
-  Place place;
-  std::string problem_file;
-  std::string data_file;
-  DataFileOptions data_options;
-  std::string session;          // its id, in place of the files; empty: none
+struct FitArguments : StudyInput {
   std::string validation_file;  // another record to predict; empty: none
   std::vector<std::string> outputs;
   std::vector<double> probabilities;  // of the quantiles; empty: the default
@@ -150,36 +140,21 @@ struct CompareArguments {
   Format format = Format::kTable;
 };
 
-struct ReportArguments {
-  Place place;
-  std::string problem_file;
-  std::string data_file;
-  DataFileOptions data_options;
-  std::string session;  // its id, in place of the files; empty: none
+struct ReportArguments : StudyInput {
   std::string output_file = "report.html";
 };
 
-struct ProfileArguments {
-  Place place;
-  std::string problem_file;
-  std::string data_file;
-  DataFileOptions data_options;
-  std::string session;  // its id, in place of the files; empty: none
+struct ProfileArguments : StudyInput {
   std::vector<std::string> parameters;
   int points = 0;         // 0: the default
   std::string plot_file;  // empty: none
   Format format = Format::kTable;
 };
 
-struct RegularizationArguments {
-  Place place;
-  std::string problem_file;
-  std::string data_file;
-  DataFileOptions data_options;
-  std::string session;  // its id, in place of the files; empty: none
-  double lowest = 0;    // 0: the default
-  double highest = 0;   // 0: the default
-  int points = 0;       // 0: the default
+struct RegularizationArguments : StudyInput {
+  double lowest = 0;   // 0: the default
+  double highest = 0;  // 0: the default
+  int points = 0;      // 0: the default
   std::string plot_file;
   Format format = Format::kTable;
 };

@@ -29,9 +29,9 @@ struct Contestant : Assessment {
 absl::StatusOr<Contestant> Assess(const std::string& file, const CompareArguments& arguments,
                                   Backend& backend, DataWarnings& warnings) {
   v1::Experiment experiment;
-  POLYEST_ASSIGN_OR_RETURN(InputFiles files,
-                           ReadProblemAndData(file, arguments.files.back(), arguments.place,
-                                              experiment, arguments.data_options, warnings));
+  const ExperimentInput input{arguments.place, file, arguments.files.back(),
+                              arguments.data_options};
+  POLYEST_ASSIGN_OR_RETURN(InputFiles files, ReadProblemAndData(input, experiment, warnings));
   files.record = files.data;  // some rows of which are held out
   auto weighed = Weigh(experiment, backend);
   if (!weighed.ok()) return InFiles(weighed.status(), files);

@@ -13,7 +13,8 @@ namespace {
 
 absl::StatusOr<v1::ComputeCostGridResponse> EvaluateCost(const CostArguments& arguments) {
   v1::ComputeCostGridRequest request;
-  POLYEST_ASSIGN_OR_RETURN(const InputFiles files, FillInput(arguments, request));
+  POLYEST_ASSIGN_OR_RETURN(const InputFiles files,
+                           FillSubject(arguments, *request.mutable_subject()));
   request.mutable_parameters()->Add(arguments.parameters.begin(), arguments.parameters.end());
   request.set_point_count(arguments.grid_points);
   auto response = MakeBackend(arguments.place)->ComputeCostGrid(request);

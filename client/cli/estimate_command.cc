@@ -18,7 +18,8 @@ constexpr int kPlottedEstimates = 50;
 absl::StatusOr<v1::Estimate> Estimate(const EstimateArguments& arguments) {
   POLYEST_RETURN_IF_ERROR(CheckPlotFile(arguments.plot_file));
   v1::ComputeEstimateRequest request;
-  POLYEST_ASSIGN_OR_RETURN(const InputFiles files, FillInput(arguments, request));
+  POLYEST_ASSIGN_OR_RETURN(const InputFiles files,
+                           FillSubject(arguments, *request.mutable_subject()));
   if (!arguments.plot_file.empty()) request.set_history_point_count(kPlottedEstimates);
   auto response = MakeBackend(arguments.place)->ComputeEstimate(request);
   if (!response.ok()) return InFiles(response.status(), files);

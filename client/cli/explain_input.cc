@@ -125,9 +125,7 @@ absl::StatusOr<ExplainInput> ReadExplainInput(const ExplainArguments& arguments,
   v1::Experiment& experiment = *request.mutable_subject()->mutable_experiment();
   ExplainInput input;
   DataWarnings warnings;
-  POLYEST_ASSIGN_OR_RETURN(
-      input.files, ReadProblemAndData(arguments.problem_file, arguments.data_file, arguments.place,
-                                      experiment, arguments.data_options, warnings));
+  POLYEST_ASSIGN_OR_RETURN(input.files, ReadProblemAndData(arguments, experiment, warnings));
   auto response = backend.ComputeEstimate(request);
   if (!response.ok()) return InFiles(response.status(), input.files);
   input.problem = std::move(*experiment.mutable_problem());

@@ -30,7 +30,7 @@ constexpr int kShownLags = 3;
 absl::StatusOr<v1::PredictResponse> Fit(const FitArguments& arguments) {
   POLYEST_RETURN_IF_ERROR(CheckPlotFile(arguments.plot_file));
   v1::PredictRequest request;
-  POLYEST_ASSIGN_OR_RETURN(InputFiles files, FillInput(arguments, request));
+  POLYEST_ASSIGN_OR_RETURN(InputFiles files, FillSubject(arguments, *request.mutable_subject()));
   if (!arguments.validation_file.empty()) {
     POLYEST_ASSIGN_OR_RETURN(const v1::Problem problem,
                              ProblemOf(request.subject(), arguments.place));

@@ -39,7 +39,8 @@ absl::StatusOr<v1::ComputePosteriorResponse> GetPosterior(const PosteriorArgumen
     pair.set_first(names[0]);
     pair.set_second(names[1]);
   }
-  POLYEST_ASSIGN_OR_RETURN(const InputFiles files, FillInput(arguments, request));
+  POLYEST_ASSIGN_OR_RETURN(const InputFiles files,
+                           FillSubject(arguments, *request.mutable_subject()));
   request.mutable_probabilities()->Add(arguments.probabilities.begin(),
                                        arguments.probabilities.end());
   request.set_sample_count(arguments.samples);

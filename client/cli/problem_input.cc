@@ -32,20 +32,30 @@ absl::Status CheckFilesAreNotSwapped(const std::string& problem_file,
                                                  ", a problem: swap them"));
 }
 
-absl::StatusOr<InputFiles> ReadProblemAndData(const std::string& problem_file,
-                                              const std::string& data_file, const Place& place,
-                                              v1::Experiment& experiment,
-                                              const DataFileOptions& options,
-                                              DataWarnings& warnings) {
-  POLYEST_RETURN_IF_ERROR(CheckFilesAreNotSwapped(problem_file, data_file));
-  InputFiles files{.problem = problem_file};
+absl::StatusOr<InputFiles> ReadProblemAndData(const ExperimentInput& input,
+                                              v1::Experiment& experiment, DataWarnings& warnings) {
+  POLYEST_RETURN_IF_ERROR(CheckFilesAreNotSwapped(input.problem_file, input.data_file));
+  InputFiles files{.problem = input.problem_file};
   v1::Problem& problem = *experiment.mutable_problem();
-  POLYEST_ASSIGN_OR_RETURN(problem, ReadCheckedProblem(problem_file, place));
-  POLYEST_ASSIGN_OR_RETURN(const DataColumns columns, DataColumnsFor(problem, place, options));
+  POLYEST_ASSIGN_OR_RETURN(problem, ReadCheckedProblem(input.problem_file, input.place));
+  POLYEST_ASSIGN_OR_RETURN(const DataColumns columns,
+                           DataColumnsFor(problem, input.place, input.data_options));
   POLYEST_ASSIGN_OR_RETURN(*experiment.mutable_measurements(),
-                           ReadData(data_file, columns, files.data));
-  warnings.Print(problem, place, experiment.measurements());
+                           ReadData(input.data_file, columns, files.data));
+  warnings.Print(problem, input.place, experiment.measurements());
   return files;
+}
+
+absl::StatusOr<InputFiles> FillSubject(const ExperimentInput& input, v1::Subject& subject) {
+  DataWarnings warnings;
+  return ReadProblemAndData(input, *subject.mutable_experiment(), warnings);
+}
+
+absl::StatusOr<InputFiles> FillSubject(const StudyInput& input, v1::Subject& subject) {
+  const ExperimentInput& experiment = input;
+  if (input.session.empty()) return FillSubject(experiment, subject);
+  subject.set_session(absl::StrCat("sessions/", input.session));
+  return InputFiles();
 }
 
 absl::StatusOr<v1::Problem> ProblemOf(const v1::Subject& subject, const Place& place) {

@@ -5,7 +5,6 @@
 // errors of the data.
 
 #include <absl/status/statusor.h>
-#include <absl/strings/str_cat.h>
 
 #include <string>
 
@@ -13,7 +12,6 @@
 #include "client/cli/data_input.h"
 #include "client/cli/data_warnings.h"
 #include "client/cli/input_files.h"
-#include "core/common/status.h"
 #include "polyest/v1/problem.pb.h"
 #include "polyest/v1/study_service.pb.h"
 
@@ -29,36 +27,15 @@ absl::Status CheckFilesAreNotSwapped(const std::string& problem_file, const std:
 
 // Reads a checked problem and the data for it, and warns of data that are probably not what was
 // meant. Returns their files.
-absl::StatusOr<InputFiles> ReadProblemAndData(const std::string& problem_file,
-                                              const std::string& data_file, const Place& place,
-                                              v1::Experiment& experiment,
-                                              const DataFileOptions& options,
-                                              DataWarnings& warnings);
+absl::StatusOr<InputFiles> ReadProblemAndData(const ExperimentInput& input,
+                                              v1::Experiment& experiment, DataWarnings& warnings);
 
-// Returns what the arguments say about the data file; the defaults if their command says nothing.
-template <typename Arguments>
-DataFileOptions DataOptionsOf(const Arguments& arguments) {
-  if constexpr (requires { arguments.data_options; }) return arguments.data_options;
-  return {};
-}
+// Fills in the subject of a request from the problem and the data in two files, which it returns,
+// or with the session that is named in their place.
+absl::StatusOr<InputFiles> FillSubject(const ExperimentInput& input, v1::Subject& subject);
+absl::StatusOr<InputFiles> FillSubject(const StudyInput& input, v1::Subject& subject);
 
-// Fills in the subject of a request: the session that the arguments name, if their command takes
-// one, or else the problem and the data in their two files, which it returns.
-template <typename Arguments, typename Request>
-absl::StatusOr<InputFiles> FillInput(const Arguments& arguments, Request& request) {
-  if constexpr (requires { arguments.session; }) {
-    if (!arguments.session.empty()) {
-      request.mutable_subject()->set_session(absl::StrCat("sessions/", arguments.session));
-      return InputFiles();
-    }
-  }
-  DataWarnings warnings;
-  return ReadProblemAndData(arguments.problem_file, arguments.data_file, arguments.place,
-                            *request.mutable_subject()->mutable_experiment(),
-                            DataOptionsOf(arguments), warnings);
-}
-
-// Returns the problem of a subject that FillInput has filled in; asks the daemon for a session's.
+// Returns the problem of a subject that FillSubject has filled in; asks the daemon for a session's.
 absl::StatusOr<v1::Problem> ProblemOf(const v1::Subject& subject, const Place& place);
 
 }  // namespace polyest::internal

@@ -23,7 +23,8 @@ namespace {
 absl::StatusOr<v1::ComputeCostProfilesResponse> Profile(const ProfileArguments& arguments) {
   POLYEST_RETURN_IF_ERROR(CheckPlotFile(arguments.plot_file));
   v1::ComputeCostProfilesRequest request;
-  POLYEST_ASSIGN_OR_RETURN(const InputFiles files, FillInput(arguments, request));
+  POLYEST_ASSIGN_OR_RETURN(const InputFiles files,
+                           FillSubject(arguments, *request.mutable_subject()));
   request.mutable_parameters()->Add(arguments.parameters.begin(), arguments.parameters.end());
   request.set_point_count(arguments.points);
   // A table needs fewer points than a plot.

@@ -25,7 +25,8 @@ using Sweep = v1::ComputeRegularizationSweepResponse;
 absl::StatusOr<Sweep> SweepRegularization(const RegularizationArguments& arguments) {
   POLYEST_RETURN_IF_ERROR(CheckPlotFile(arguments.plot_file));
   v1::ComputeRegularizationSweepRequest request;
-  POLYEST_ASSIGN_OR_RETURN(const InputFiles files, FillInput(arguments, request));
+  POLYEST_ASSIGN_OR_RETURN(const InputFiles files,
+                           FillSubject(arguments, *request.mutable_subject()));
   request.set_lowest(arguments.lowest);
   request.set_highest(arguments.highest);
   request.set_point_count(arguments.points);

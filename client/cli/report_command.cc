@@ -57,18 +57,17 @@ absl::Status Compute(const v1::Subject& subject, Backend& backend, ReportContent
 
 absl::Status MakeReport(const ReportArguments& arguments) {
   POLYEST_RETURN_IF_ERROR(CheckOutputFile("--output", arguments.output_file));
-  // Any of the requests has the subject.
-  v1::ComputeEstimateRequest input;
-  POLYEST_ASSIGN_OR_RETURN(const InputFiles files, FillInput(arguments, input));
+  v1::Subject subject;
+  POLYEST_ASSIGN_OR_RETURN(const InputFiles files, FillSubject(arguments, subject));
   ReportContent content;
   content.subject = arguments.session.empty()
                         ? absl::StrCat(arguments.problem_file, ", ", arguments.data_file)
                         : absl::StrCat("session ", arguments.session);
-  POLYEST_ASSIGN_OR_RETURN(content.problem, ProblemOf(input.subject(), arguments.place));
+  POLYEST_ASSIGN_OR_RETURN(content.problem, ProblemOf(subject, arguments.place));
   content.date = absl::FormatTime("%Y-%m-%d %H:%M UTC", absl::Now(), absl::UTCTimeZone());
   content.version = POLYEST_VERSION;
   const auto backend = MakeBackend(arguments.place);
-  const absl::Status computed = Compute(input.subject(), *backend, content);
+  const absl::Status computed = Compute(subject, *backend, content);
   if (!computed.ok()) return InFiles(computed, files);
   return WriteOutputFile("--output", arguments.output_file, ReportPage(content));
 }

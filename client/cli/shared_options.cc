@@ -131,15 +131,15 @@ void AddData(CLI::App& command, std::string& file) {
   command.add_option("data", file, "The measurements, a CSV file")->required();
 }
 
-void AddStudyInput(CLI::App& command, Place& place, std::string& problem_file,
-                   std::string& data_file, std::string& session) {
+void AddStudyInput(CLI::App& command, StudyInput& input) {
   CLI::Option* const problem =
-      command.add_option("problem", problem_file, "The problem, a JSON file");
-  CLI::Option* const data = command.add_option("data", data_file, "The measurements, a CSV file");
-  CLI::Option* const server = AddPlace(command, place);
+      command.add_option("problem", input.problem_file, "The problem, a JSON file");
+  CLI::Option* const data =
+      command.add_option("data", input.data_file, "The measurements, a CSV file");
+  CLI::Option* const server = AddPlace(command, input.place);
   CLI::Option* const name =
       command
-          .add_option("--session", session,
+          .add_option("--session", input.session,
                       "A session of the daemon, in place of the problem and the data")
           ->needs(server)
           ->excludes(problem)
@@ -149,6 +149,7 @@ void AddStudyInput(CLI::App& command, Place& place, std::string& problem_file,
     throw CLI::RequiredError(problem->count() > 0 ? "data"
                                                   : "problem and data, or else --session,");
   });
+  AddDataOptions(command, input.data_options);
 }
 
 void AddOutputs(CLI::App& command, std::vector<std::string>& outputs, const char* help) {

@@ -30,14 +30,7 @@ void AddData(CLI::App& command, std::string& file);
 // --date-order.
 void AddDataOptions(CLI::App& command, DataFileOptions& options);
 // Adds problem and data files, or --session in their place, for a study of an estimate.
-void AddStudyInput(CLI::App& command, Place& place, std::string& problem_file,
-                   std::string& data_file, std::string& session);
-template <typename Arguments>
-void AddStudyInput(CLI::App& command, Arguments& arguments) {
-  AddStudyInput(command, arguments.place, arguments.problem_file, arguments.data_file,
-                arguments.session);
-  AddDataOptions(command, arguments.data_options);
-}
+void AddStudyInput(CLI::App& command, StudyInput& input);
 // Adds --outputs, a comma-separated list, with a help that begins with `help`.
 void AddOutputs(CLI::App& command, std::vector<std::string>& outputs, const char* help);
 // Adds --plot. `what`: what it draws, as in "the fit".

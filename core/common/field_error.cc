@@ -110,6 +110,11 @@ absl::Status CheckRange(const FieldPath& field, int64_t value, int64_t least, in
   return InvalidField(field, absl::StrCat(value, " must be from ", least, " to ", most));
 }
 
+absl::Status CheckAtLeast(const FieldPath& field, int64_t value, int64_t least) {
+  if (value >= least) return absl::OkStatus();
+  return InvalidField(field, absl::StrCat(value, " must be at least ", least));
+}
+
 std::string RowInWords(int64_t row) { return absl::StrCat("row ", row, " (counted from 0)"); }
 
 absl::Status NamedInWords(const FieldPath& field, const absl::Status& status) {

@@ -76,6 +76,8 @@ absl::Status FieldError(absl::StatusCode code, const FieldPath& field, absl::str
 absl::Status InvalidField(const FieldPath& field, absl::string_view sentence);
 // Returns OK for an integer from `least` to `most`, or an InvalidField that says so.
 absl::Status CheckRange(const FieldPath& field, int64_t value, int64_t least, int64_t most);
+// Returns OK for an integer from `least` on, or an InvalidField that says so.
+absl::Status CheckAtLeast(const FieldPath& field, int64_t value, int64_t least);
 // Returns a status that refuses a field whose sentence already names the place ("row 3 (counted
 // from 0), column x: …"): the path is in the payload only.
 absl::Status NamedInWords(const FieldPath& field, const absl::Status& status);

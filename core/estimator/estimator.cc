@@ -366,9 +366,7 @@ absl::StatusOr<std::unique_ptr<Estimator>> EstimatorAccess::Make(ResolvedProblem
   if (problem.channels() == 0) {
     return InvalidField("measured", "at least one output must be measured");
   }
-  if (options.threads < 1) {
-    return InvalidField("threads", absl::StrFormat("%d must be at least 1", options.threads));
-  }
+  POLYEST_RETURN_IF_ERROR(CheckAtLeast("threads", options.threads, 1));
   if (options.store && options.store->rows() > 0) {
     return absl::FailedPreconditionError(absl::StrFormat(
         "the sample store holds %d rows already; an estimator begins with an empty one",

@@ -24,14 +24,8 @@ absl::Status IntegrationOptions::Validate() const {
     return InvalidField("relative_tolerance",
                         absl::StrCat(relative_tolerance, " must lie between 1e-13 and 0.01"));
   }
-  if (max_steps < 1) {
-    return InvalidField("max_steps", absl::StrCat(max_steps, " must be at least 1"));
-  }
-  if (samples_between_checkpoints < 1) {
-    return InvalidField("samples_between_checkpoints",
-                        absl::StrCat(samples_between_checkpoints, " must be at least 1"));
-  }
-  return absl::OkStatus();
+  POLYEST_RETURN_IF_ERROR(CheckAtLeast("max_steps", max_steps, 1));
+  return CheckAtLeast("samples_between_checkpoints", samples_between_checkpoints, 1);
 }
 
 }  // namespace polyest

@@ -7,6 +7,7 @@
 
 #include "core/chaos/multi_index.h"
 #include "core/common/field_error.h"
+#include "core/common/status.h"
 #include "core/estimator/problem/truncation.h"
 
 namespace polyest {
@@ -14,9 +15,7 @@ namespace polyest {
 using namespace internal;
 
 absl::Status ExpansionOptions::Validate(int dimension) const {
-  if (order && *order < 1) {
-    return InvalidField("expansion.order", absl::StrFormat("%d must be at least 1", *order));
-  }
+  if (order) POLYEST_RETURN_IF_ERROR(CheckAtLeast("expansion.order", *order, 1));
   if (!(hyperbolic_exponent > 0 && hyperbolic_exponent <= 1)) {
     return InvalidField("expansion.hyperbolic_exponent",
                         absl::StrFormat("%g must be in (0, 1]", hyperbolic_exponent));

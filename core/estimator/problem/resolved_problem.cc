@@ -71,10 +71,8 @@ absl::Status ValidateReplayLimit(const Problem& problem) {
   const std::optional<int64_t>& limit = problem.expansion.max_replay_row_count;
   if (!limit) return absl::OkStatus();
   const FieldPath field{"expansion", "max_replay_row_count"};
-  const int64_t least = 4 * int64_t{problem.integration.samples_between_checkpoints};
-  if (*limit < least) {
-    return InvalidField(field, absl::StrFormat("%d must be at least %d", *limit, least));
-  }
+  POLYEST_RETURN_IF_ERROR(
+      CheckAtLeast(field, *limit, 4 * int64_t{problem.integration.samples_between_checkpoints}));
   for (const UncertainParameter& parameter : problem.uncertain) {
     if (!parameter.per_run) continue;
     return InvalidField(

@@ -255,9 +255,7 @@ absl::StatusOr<CostGrid> EvaluateCostGrid(const ResolvedProblem& problem, const 
   if (problem.channels() == 0) {
     return InvalidField("measured", "at least one output must be measured");
   }
-  if (options.threads < 1) {
-    return InvalidField("threads", absl::StrFormat("%d must be at least 1", options.threads));
-  }
+  POLYEST_RETURN_IF_ERROR(CheckAtLeast("threads", options.threads, 1));
   POLYEST_ASSIGN_OR_RETURN(CheckedSamples record, SampleChecks(problem).Check(samples));
   if (record.after.run >= problem.max_joint_runs()) {
     return InvalidField(

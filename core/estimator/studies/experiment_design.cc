@@ -218,12 +218,8 @@ using namespace internal;
 
 absl::Status ExperimentOptions::Validate() const {
   POLYEST_RETURN_IF_ERROR((TimeGrid{until_s, step_s}.Validate()));
-  if (samples < 1 || samples > kMaxSampleTimes) {
-    return InvalidField("samples",
-                        absl::StrFormat("%d must lie between 1 and %d", samples, kMaxSampleTimes));
-  }
-  if (threads >= 1) return absl::OkStatus();
-  return InvalidField("threads", absl::StrFormat("%d must be at least 1", threads));
+  POLYEST_RETURN_IF_ERROR(CheckRange("samples", samples, 1, kMaxSampleTimes));
+  return CheckAtLeast("threads", threads, 1);
 }
 
 }  // namespace polyest

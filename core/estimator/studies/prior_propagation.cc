@@ -77,18 +77,9 @@ absl::Status PropagationOptions::Validate() const {
     return InvalidField(FieldPath{"probabilities", i},
                         absl::StrFormat("%g must lie between 0 and 1", probabilities[i]));
   }
-  if (density_bins < 0 || density_bins > kMaxDensityBins) {
-    return InvalidField("density_bins", absl::StrFormat("%d must lie between 0 and %d",
-                                                        density_bins, kMaxDensityBins));
-  }
-  if (density_samples < 1 || density_samples > kMaxDensitySamples) {
-    return InvalidField("density_samples", absl::StrFormat("%d must lie between 1 and %d",
-                                                           density_samples, kMaxDensitySamples));
-  }
-  if (threads < 1) {
-    return InvalidField("threads", absl::StrFormat("%d must be at least 1", threads));
-  }
-  return absl::OkStatus();
+  POLYEST_RETURN_IF_ERROR(CheckRange("density_bins", density_bins, 0, kMaxDensityBins));
+  POLYEST_RETURN_IF_ERROR(CheckRange("density_samples", density_samples, 1, kMaxDensitySamples));
+  return CheckAtLeast("threads", threads, 1);
 }
 
 }  // namespace polyest

@@ -199,8 +199,7 @@ using namespace internal;
 
 absl::Status SensitivityOptions::Validate() const {
   POLYEST_RETURN_IF_ERROR((TimeGrid{until_s, step_s}.Validate()));
-  if (threads >= 1) return absl::OkStatus();
-  return InvalidField("threads", absl::StrFormat("%d must be at least 1", threads));
+  return CheckAtLeast("threads", threads, 1);
 }
 
 }  // namespace polyest
