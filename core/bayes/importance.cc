@@ -29,35 +29,19 @@ Mixture MixtureOf(int dimension) {
   return {{{0.85, std::min(1.1, narrow)}, {0.15, 2.0}}};
 }
 
-// Returns log Σ_c p_c s_c⁻ⁿ e^{−r²/2s_c²} for each r².
-Vector LogDensity(const Mixture& mixture, const Vector& squared_radii, int dimension) {
-  // The sum is relative to the widest component, whose exponential underflows last.
-  const Eigen::ArrayXd widest =
-      0.5 * squared_radii.array() / (mixture.back().scale * mixture.back().scale);
-  Eigen::ArrayXd density = Eigen::ArrayXd::Zero(squared_radii.size());
-  for (const Component& c : mixture) {
-    density += c.share * std::pow(c.scale, -dimension) *
-               (widest - 0.5 * squared_radii.array() / (c.scale * c.scale)).exp();
-  }
-  return density.log() - widest;
-}
-
 // Points u of the mixture before L⁻ᵀ, and log q at each.
 struct Proposal {
   Matrix points;
   Vector log_density;
 };
 
-// Takes standard normal points, the first share of them scaled for the first component and so on.
-// Stretches of a Halton sequence are themselves low-discrepancy points.
+// The first share of the points is scaled for the first component and so on. Stretches of a Halton
+// sequence are themselves low-discrepancy points.
 Proposal MakeProposal(int dimension, int points) {
-  const Mixture mixture = MixtureOf(dimension);
   const std::vector<Germ> germs(static_cast<size_t>(dimension), Germ::Normal());
   Proposal proposal{CollocationPoints(PointSet::kHalton, germs, 0, points).value(), {}};
-  const auto first = static_cast<Eigen::Index>(mixture.front().share * points);
-  proposal.points.topRows(first) *= mixture.front().scale;
-  proposal.points.bottomRows(points - first) *= mixture.back().scale;
-  proposal.log_density = LogDensity(mixture, proposal.points.rowwise().squaredNorm(), dimension);
+  ScaleAsProposal(proposal.points);
+  proposal.log_density = ProposalLogDensity(proposal.points.rowwise().squaredNorm(), dimension);
   return proposal;
 }
 
@@ -78,15 +62,29 @@ std::shared_ptr<const Proposal> ProposalOf(int dimension, int points) {
 
 }  // namespace
 
-WeightedDraws ImportanceSample(const Cost& cost, const Vector& lower, const Vector& upper,
-                               const ConstVectorRef& minimum, const ConstMatrixRef& hessian_factor,
-                               int points) {
-  POLYEST_CHECK(points >= 100);
-  const int n = cost.dimension();
-  const std::shared_ptr<const Proposal> proposal = ProposalOf(n, points);
-  // η = η̂ + L⁻ᵀ u, a point a row: (uᵀ L⁻¹) = (L⁻ᵀ u)ᵀ
-  Matrix etas = SolveLowerTransposedRows(hessian_factor, proposal->points);
-  etas.rowwise() += minimum.transpose();
+Vector ProposalLogDensity(const Vector& squared_radii, int dimension) {
+  const Mixture mixture = MixtureOf(dimension);
+  // The sum is relative to the widest component, whose exponential underflows last.
+  const Eigen::ArrayXd widest =
+      0.5 * squared_radii.array() / (mixture.back().scale * mixture.back().scale);
+  Eigen::ArrayXd density = Eigen::ArrayXd::Zero(squared_radii.size());
+  for (const Component& c : mixture) {
+    density += c.share * std::pow(c.scale, -dimension) *
+               (widest - 0.5 * squared_radii.array() / (c.scale * c.scale)).exp();
+  }
+  return density.log() - widest;
+}
+
+void ScaleAsProposal(Matrix& points) {
+  const Mixture mixture = MixtureOf(static_cast<int>(points.cols()));
+  const auto count = static_cast<double>(points.rows());
+  const auto first = static_cast<Eigen::Index>(mixture.front().share * count);
+  points.topRows(first) *= mixture.front().scale;
+  points.bottomRows(points.rows() - first) *= mixture.back().scale;
+}
+
+WeightedDraws WeighProposed(const Cost& cost, const Vector& lower, const Vector& upper, Matrix etas,
+                            const Vector& log_density) {
   WeightedDraws draws;
   Vector costs;
   const DifferentialEvolution box(cost, lower, upper, 0);
@@ -94,10 +92,10 @@ WeightedDraws ImportanceSample(const Cost& cost, const Vector& lower, const Vect
   const double least = costs.minCoeff();
   if (!std::isfinite(least)) return draws;
   // log w = −J − log q
-  const Vector log_weights = least - costs.array() - proposal->log_density.array();
+  const Vector log_weights = least - costs.array() - log_density.array();
   Vector weights = (log_weights.array() - log_weights.maxCoeff()).exp();
   Eigen::Index kept = 0;
-  for (Eigen::Index i = 0; i < points; ++i) {
+  for (Eigen::Index i = 0; i < etas.rows(); ++i) {
     // The weight is tested, too: a vectorized exponential of −∞ need not be 0.
     if (!std::isfinite(costs[i]) || !(weights[i] > 0)) continue;
     etas.row(kept) = etas.row(i);
@@ -109,6 +107,17 @@ WeightedDraws ImportanceSample(const Cost& cost, const Vector& lower, const Vect
   draws.weights = weights.head(kept) / weights.head(kept).sum();
   draws.effective_size = 1 / draws.weights.squaredNorm();
   return draws;
+}
+
+WeightedDraws ImportanceSample(const Cost& cost, const Vector& lower, const Vector& upper,
+                               const ConstVectorRef& minimum, const ConstMatrixRef& hessian_factor,
+                               int points) {
+  POLYEST_CHECK(points >= 100);
+  const std::shared_ptr<const Proposal> proposal = ProposalOf(cost.dimension(), points);
+  // η = η̂ + L⁻ᵀ u, a point a row: (uᵀ L⁻¹) = (L⁻ᵀ u)ᵀ
+  Matrix etas = SolveLowerTransposedRows(hessian_factor, proposal->points);
+  etas.rowwise() += minimum.transpose();
+  return WeighProposed(cost, lower, upper, std::move(etas), proposal->log_density);
 }
 
 }  // namespace polyest::internal

@@ -26,6 +26,18 @@ struct WeightedDraws {
   double effective_size = 0;
 };
 
+// Returns log Σ_c p_c s_c⁻ⁿ e^{−r²/2s_c²} for each r².
+Vector ProposalLogDensity(const Vector& squared_radii, int dimension);
+
+// Scales standard normal points (any number × n) by s_1, the first p_1 of them, and by s_2.
+void ScaleAsProposal(Matrix& points);
+
+// Returns the draws among proposed points (any number × n) that have a positive weight, by the
+// logarithms of the density from which the points were drawn, up to a common constant. `lower` and
+// `upper` (n) bound the box outside which the density counts as 0.
+WeightedDraws WeighProposed(const Cost& cost, const Vector& lower, const Vector& upper, Matrix etas,
+                            const Vector& log_density);
+
 // Draws `points` ≥ 100 points. `hessian_factor` is L (n × n), lower triangular with a positive
 // diagonal; `lower` and `upper` (n) bound the box outside which the density counts as 0.
 WeightedDraws ImportanceSample(const Cost& cost, const Vector& lower, const Vector& upper,
