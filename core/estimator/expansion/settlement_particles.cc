@@ -1,11 +1,8 @@
 #include "core/estimator/expansion/settlement_particles.h"
 
 #include <algorithm>
-#include <random>
-#include <utility>
-#include <vector>
 
-#include "core/bayes/weighted_samples.h"
+#include "core/bayes/differential_evolution.h"
 #include "core/common/status.h"
 #include "core/estimator/expansion/guarded_importance.h"
 
@@ -15,16 +12,8 @@ namespace {
 // Importance sampling's points: so many for each parameter, and at most.
 constexpr int kPointsPerParameter = 2048, kMaxImportancePoints = 4096;
 
-// Resamples systematically, then shuffles: the first particles become check points, and the order
-// of quasi-random points is anything but random.
-Particles Resample(const WeightedDraws& draws, int count, uint64_t seed) {
-  std::vector<Eigen::Index> rows = EquallyWeighted(draws.weights, count);
-  std::mt19937_64 generator(seed);
-  for (size_t i = rows.size() - 1; i > 0; --i) {
-    std::swap(rows[i], rows[static_cast<size_t>(generator() % (i + 1))]);
-  }
-  return {draws.etas(rows, Eigen::all), draws.costs(rows)};
-}
+// Moves of particles that were drawn with a doubtful tail of their weights.
+constexpr int kSweeps = 40;
 
 }  // namespace
 
@@ -37,9 +26,18 @@ absl::StatusOr<Particles> SampleForSettlement(const Cost& cost, const ExpansionD
   const int points = std::min(kMaxImportancePoints, kPointsPerParameter * cost.dimension());
   const GuardedDraws drawn = DrawIfNearlyGaussian(cost, design, local, points, stop);
   POLYEST_RETURN_IF_ERROR(stop.Check());
-  if (drawn.draws) return Resample(*drawn.draws, options.particles, seed);
+  if (drawn.draws) return Resampled(*drawn.draws, options.particles, seed);
   Vector lower, upper;
   SamplingBox(design, lower, upper);
+  if (drawn.rough) {
+    Particles particles = Resampled(*drawn.rough, options.particles, seed);
+    DifferentialEvolution moves(cost, lower, upper, seed);
+    for (int i = 0; i < kSweeps; ++i) {
+      POLYEST_RETURN_IF_ERROR(stop.Check());
+      moves.Sweep(1, 0, particles.etas.rows(), particles);
+    }
+    return particles;
+  }
   return SamplePosterior(cost, lower, upper, local, options, stop);
 }
 

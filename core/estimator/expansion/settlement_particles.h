@@ -1,9 +1,9 @@
 #pragma once
 
 // Particles of the posterior on an expansion, for a settlement (reexpansion.h): by importance
-// sampling where the posterior is nearly Gaussian (guarded_importance.h), which needs some ten
-// thousand evaluations of the cost, and elsewhere by tempering (bayes/posterior.h), which needs
-// some hundred thousand.
+// sampling where the posterior is nearly Gaussian or a mixture of such modes
+// (guarded_importance.h), which needs some ten thousand evaluations of the cost, and elsewhere by
+// tempering (bayes/posterior.h), which needs some hundred thousand.
 
 #include <absl/status/statusor.h>
 

@@ -14,6 +14,7 @@
 #include "core/bayes/weighted_samples.h"
 #include "core/common/status.h"
 #include "core/estimator/expansion/guarded_importance.h"
+#include "core/estimator/expansion/likelihood_power.h"
 #include "core/estimator/expansion/search_domain.h"
 #include "core/estimator/posterior/cover_draws.h"
 
@@ -21,7 +22,9 @@ namespace polyest::internal {
 namespace {
 
 constexpr int kParticles = 2000;
-constexpr int kSweeps = 6;        // after each tempering step
+// Moves of each particle after a tempering step, and where the cost has several minima in many
+// dimensions: on ridges between them the particles take longer to find their shares.
+constexpr int kSweeps = 6, kSweepsOfSeveral = 30;
 constexpr int kFinalSweeps = 20;  // before the chains start
 constexpr uint64_t kSeed = 20'071'121;
 constexpr int kStarts = 6;
@@ -66,6 +69,7 @@ class Drawing {
     GuardedDraws drawn =
         DrawIfNearlyGaussian(cost_, design_, guesses_, effort_.importance_points, stop_);
     draws_.minima = std::move(drawn.minima);
+    rough_ = std::move(drawn.rough);
     if (!drawn.draws) return false;
     TakeWeighted(*std::move(drawn.draws));
     return true;
@@ -88,14 +92,20 @@ class Drawing {
     draws_.effective_size = Vector::Constant(cost_.dimension(), drawn.effective_size);
   }
 
-  absl::Status DrawByChains() {
+  // Returns particles of the posterior.
+  absl::StatusOr<Particles> StartOfChains() {
+    if (rough_) return Resampled(*rough_, kParticles, kSeed);
     SamplerOptions options;
     options.particles = kParticles;
     options.seed = kSeed;
-    options.sweeps = kSweeps;
+    const bool several = draws_.minima.size() > 1 && cost_.dimension() > kFewDimensions;
+    options.sweeps = several ? kSweepsOfSeveral : kSweeps;
     options.final_sweeps = kFinalSweeps;
-    POLYEST_ASSIGN_OR_RETURN(const Particles particles,
-                             SamplePosterior(cost_, lower_, upper_, guesses_, options, stop_));
+    return SamplePosterior(cost_, lower_, upper_, guesses_, options, stop_);
+  }
+
+  absl::Status DrawByChains() {
+    POLYEST_ASSIGN_OR_RETURN(const Particles particles, StartOfChains());
     ChainOptions chain_options;
     chain_options.effective_size = effort_.chain_effective_size;
     chain_options.max_sweeps = effort_.max_sweeps;
@@ -138,6 +148,7 @@ class Drawing {
   const MinimizationProblem search_;
   Vector lower_, upper_;
   Matrix to_scores_;
+  std::optional<WeightedDraws> rough_;
   PosteriorDraws draws_;
 };
 

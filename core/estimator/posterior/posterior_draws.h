@@ -1,9 +1,10 @@
 #pragma once
 
 // Draws of the posterior on an expansion, with as few evaluations as a reliable result needs.
-// Importance sampling from the curvature's Gaussian is used where the posterior is nearly Gaussian
-// (expansion/guarded_importance.h). Elsewhere Markov chains are started from tempered particles
-// (bayes/posterior.h, bayes/markov_chains.h).
+// Importance sampling from the curvature's Gaussian, or from one at each of several minima, is used
+// where that approximates the posterior (expansion/guarded_importance.h). Elsewhere Markov chains
+// (bayes/markov_chains.h) are started from its draws if they are good enough for that, or else from
+// tempered particles (bayes/posterior.h).
 
 #include <absl/status/statusor.h>
 
