@@ -180,7 +180,8 @@ template <class Archive>
 void serialize(Archive& archive, SettlementMemory& memory) {
   OrderInVain& tried = memory.order;
   archive(memory.costs, tried.order, tried.error, tried.centre, tried.axes, tried.rows,
-          tried.noise_variance);
+          tried.noise_variance, memory.prior.stays_from, memory.prior.tried);
+  Flag(archive, memory.prior.in_vain);
 }
 
 template <class Archive>

@@ -55,12 +55,17 @@ std::pair<double, double> TrustedRange(const Germ& germ) {
 }
 
 absl::StatusOr<ExpansionDesign> DesignForPrior(const ResolvedProblem& problem) {
+  return DesignForPrior(problem, FirstTruncation(problem.problem().expansion, problem.dimension()));
+}
+
+absl::StatusOr<ExpansionDesign> DesignForPrior(const ResolvedProblem& problem,
+                                               const Truncation& truncation) {
   const Prior& prior = problem.prior();
   const ExpansionOptions& options = problem.problem().expansion;
   const int n = problem.dimension();
   ExpansionDesign design;
   design.region = Region::WholePrior(n);
-  design.basis = std::make_shared<Basis>(prior.germs(), FirstTruncation(options, n));
+  design.basis = std::make_shared<Basis>(prior.germs(), truncation);
   const int order = design.basis->order();
   const int count = PointCount(problem, *design.basis);
   POLYEST_ASSIGN_OR_RETURN(design.points, CollocationPoints(options.points, prior.germs(), order,

@@ -54,8 +54,10 @@ std::pair<double, double> TrustedRange(const Germ& germ);
 
 // Returns the design of the paper's expansion: the germs' polynomials, and points mapped by the
 // germs' quantile functions. Returns FailedPrecondition or ResourceExhausted if the collocation
-// points cannot be made.
+// points cannot be made. The truncation is the first one, or the one given.
 absl::StatusOr<ExpansionDesign> DesignForPrior(const ResolvedProblem& problem);
+absl::StatusOr<ExpansionDesign> DesignForPrior(const ResolvedProblem& problem,
+                                               const Truncation& truncation);
 // Returns the design of an expansion over the prior and its tails, to the 10⁻⁶ quantiles: Legendre
 // polynomials, which follow the model there as well as where the prior is dense.
 ExpansionDesign DesignForTails(const ResolvedProblem& problem);

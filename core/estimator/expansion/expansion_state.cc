@@ -7,6 +7,7 @@
 
 #include "core/common/linear_algebra.h"
 #include "core/common/status.h"
+#include "core/estimator/expansion/likelihood_power.h"
 #include "core/estimator/problem/truncation.h"
 
 namespace polyest::internal {
@@ -21,15 +22,15 @@ bool IsMatrix(const Matrix& matrix, Eigen::Index rows, Eigen::Index columns) {
 }
 
 // Whether an expansion of the problem can have this truncation: its first one or, for an automatic
-// order, a higher one.
+// order, a higher one, over the whole prior in many dimensions only (return_to_prior.h).
 bool IsTruncationOf(const ResolvedProblem& problem, const Truncation& truncation,
                     bool whole_prior) {
   const ExpansionOptions& options = problem.problem().expansion;
   const Truncation first = FirstTruncation(options, problem.dimension());
   if (truncation.exponent != first.exponent) return false;
   if (truncation.order == first.order) return true;
-  return !whole_prior && !options.order && truncation.order > first.order &&
-         truncation.order < kMaxTerms &&
+  return (!whole_prior || problem.dimension() > kFewDimensions) && !options.order &&
+         truncation.order > first.order && truncation.order < kMaxTerms &&
          TermCount(problem.dimension(), truncation, kMaxTerms) <= kMaxTerms;
 }
 

@@ -12,6 +12,7 @@
 #include "core/estimator/expansion/likelihood_power.h"
 #include "core/estimator/expansion/model_agreement.h"
 #include "core/estimator/expansion/overlooked_minima.h"
+#include "core/estimator/expansion/return_to_prior.h"
 #include "core/estimator/expansion/settlement_particles.h"
 #include "core/estimator/problem/truncation.h"
 
@@ -36,7 +37,6 @@ constexpr double kWiden = 1.5, kWidest = 4;
 // The expansion over a widened region should have at most this LargestShift, which grows as rows
 // are added.
 constexpr double kWidenedShift = 0.1 * kNegligibleShift;
-constexpr int64_t kReplayRows = 256;
 
 // Carries out one settlement; holds the state that changes between attempts.
 class Settler {
@@ -49,6 +49,17 @@ class Settler {
     result_.memory = request_.memory;
     result_.allowance = request_.allowance;
     if (IsInVain()) return std::move(result_);
+    if (StaysOnPrior()) {
+      POLYEST_RETURN_IF_ERROR(Sample(/*attempt=*/0).status());
+    } else {
+      POLYEST_RETURN_IF_ERROR(FollowPosterior());
+    }
+    if (!result_.expansion) POLYEST_RETURN_IF_ERROR(TryPrior());
+    return std::move(result_);
+  }
+
+ private:
+  absl::Status FollowPosterior() {
     bool may_move = true;
     for (int attempt = 0; attempt < kMaxAttempts; ++attempt) {
       POLYEST_ASSIGN_OR_RETURN(const bool sampled, Sample(attempt));
@@ -72,14 +83,13 @@ class Settler {
         if (!result_.expansion) POLYEST_RETURN_IF_ERROR(RaiseOrder(TrustedRegion(design)));
         break;
       }
-      POLYEST_ASSIGN_OR_RETURN(const bool moved, Move(region, OneOrderLess()));
+      POLYEST_ASSIGN_OR_RETURN(const bool moved, Contract(region));
       if (!moved) break;
       may_move = power_ < 1;
     }
-    return std::move(result_);
+    return absl::OkStatus();
   }
 
- private:
   const RegionalExpansion& expansion() const {
     return result_.expansion ? *result_.expansion : present_;
   }
@@ -91,6 +101,38 @@ class Settler {
     Truncation truncation = FirstTruncation(options(), request_.problem->dimension());
     truncation.order = std::max(truncation.order, present().order - 1);
     return truncation;
+  }
+
+  bool IsOnPrior() const {
+    return !result_.expansion && HasReturnedToPrior(*request_.problem, present_.design());
+  }
+
+  // Whether the expansion has returned to the prior not long ago.
+  bool StaysOnPrior() const {
+    return IsOnPrior() && static_cast<double>(request_.rows) <
+                              kStay * static_cast<double>(request_.memory.prior.stays_from);
+  }
+
+  // Returns to the prior if this serves (return_to_prior.h).
+  absl::Status TryPrior() {
+    if (result_.memory.costs.size() == 0 || !MayReturnToPrior(present_, request_)) {
+      return absl::OkStatus();
+    }
+    result_.postponed = result_.postponed || Withheld();
+    if (Withheld()) return absl::OkStatus();
+    const bool again = IsOnPrior();
+    POLYEST_ASSIGN_OR_RETURN(PriorReturn found,
+                             ReturnToPrior(present_, request_, result_.particles,
+                                           result_.memory.costs, result_.allowance, stop_));
+    result_.propagated_rows += found.propagated_rows;
+    PriorTried& memory = result_.memory.prior;
+    memory.tried = request_.rows;
+    memory.in_vain = !found.expansion;
+    if (!found.expansion) return absl::OkStatus();
+    if (!again) memory.stays_from = request_.rows;
+    result_.expansion = std::move(found.expansion);
+    ++result_.reexpansions;
+    return absl::OkStatus();
   }
 
   std::vector<int> Leaning(const ExpansionDesign& design, const Matrix& etas) const {
@@ -195,6 +237,7 @@ class Settler {
   // Returns whether a contraction to the region saves enough. A region that this settlement has
   // widened stays as it is if the expansion is as good as the model all over it.
   bool Pays(const Region& region) const {
+    if (IsOnPrior() && LargestShift(expansion(), /*power=*/1) <= kAccurateShift) return false;
     if (has_widened_ && LargestShift(expansion(), /*power=*/1) <= kNegligibleShift) return false;
     return region.LogVolume() < std::log(kPays) + TrustedRegion(expansion().design()).LogVolume();
   }
@@ -220,6 +263,19 @@ class Settler {
       result_.overlooked = found.error <= kMaxErrorAtMinima;
     }
     return absl::OkStatus();
+  }
+
+  // Moves the expansion to a smaller region. One that has returned to the prior keeps its order,
+  // and stays if it would be less accurate there.
+  absl::StatusOr<bool> Contract(const Region& region) {
+    if (!IsOnPrior()) return Move(region, OneOrderLess());
+    const double before = LargestShift(present_, /*power=*/1);
+    POLYEST_ASSIGN_OR_RETURN(const bool moved, Move(region, present()));
+    if (!moved || LargestShift(expansion(), /*power=*/1) <= before) return moved;
+    result_.memory.prior.stays_from = request_.rows;
+    result_.propagated_rows += result_.expansion->propagated_rows();
+    result_.expansion.reset();
+    return false;
   }
 
   // Returns a design over the region whose check points are the first particles.
@@ -339,33 +395,6 @@ absl::StatusOr<Settlement> SettleFurther(const RegionalExpansion& present, Settl
     settlement.expansion = std::move(begun.expansion);
   }
   return settlement;
-}
-
-absl::StatusOr<std::unique_ptr<RegionalExpansion>> Replay(const ResolvedProblem& problem,
-                                                          ExpansionDesign design,
-                                                          LearnedNoise noise,
-                                                          const SampleStore& store, int64_t rows,
-                                                          int threads, const Stop& stop) {
-  POLYEST_ASSIGN_OR_RETURN(
-      std::unique_ptr<RegionalExpansion> expansion,
-      RegionalExpansion::Make(problem, &store, std::move(design), std::move(noise), threads, stop));
-  POLYEST_RETURN_IF_ERROR(TakeRows(store, rows, stop, *expansion));
-  return expansion;
-}
-
-absl::Status TakeRows(const SampleStore& store, int64_t rows, const Stop& stop,
-                      RegionalExpansion& expansion) {
-  RowBlock block;
-  for (int64_t first = expansion.absorbed_rows(); first < rows; first += block.count()) {
-    const int64_t count = std::min(kReplayRows, rows - first);
-    POLYEST_RETURN_IF_ERROR(store.Read(first, count, block));
-    const int kept = expansion.RowsToKeptState(block);
-    if (kept < count) POLYEST_RETURN_IF_ERROR(store.Read(first, kept, block));
-    POLYEST_RETURN_IF_ERROR(expansion.Propagate(block, stop));
-    if (expansion.fitted_rows() < block.count()) return expansion.shortage();
-    for (int row = 0; row < block.count(); ++row) expansion.Absorb(row);
-  }
-  return absl::OkStatus();
 }
 
 }  // namespace polyest::internal

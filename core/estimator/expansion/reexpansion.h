@@ -12,9 +12,10 @@
 // (overlooked_minima.h). This repeats until neither is needed. A settlement that has widened the
 // region does not contract it if the expansion is as good as the model: the posterior wanders, and
 // would soon be at an edge again. If moving gains nothing, an expansion of automatic order stays in
-// place and tries higher orders; it takes the first one that follows the model there, if any. What
-// the previous settlements tried in vain is not tried again (settlement_memory.h). Each move lowers
-// the order by one. Where the record is long and the present expansion is accurate the sums are
+// place and tries higher orders; it takes the first one that follows the model there, if any. Where
+// nothing of this makes it accurate, it may return to the whole prior (return_to_prior.h). What the
+// previous settlements tried in vain is not tried again (settlement_memory.h). Each move lowers the
+// order by one. Where the record is long and the present expansion is accurate the sums are
 // carried over instead of propagating the record, with the order as it is (carry_over.h), with a
 // larger error if the record may not be propagated again (replay_allowance.h). The region is
 // derived from particles and never from a minimum and its Hessian: in a direction that the data do

@@ -33,11 +33,20 @@ struct OrderInVain {
   Vector noise_variance;  // m, as a factor of the stated one
 };
 
+// When the expansion returned to the whole prior (return_to_prior.h), in rows of the record; 0 is
+// never.
+struct PriorTried {
+  int64_t stays_from = 0;  // the last return, or the last move away that did not serve
+  int64_t tried = 0;       // the last trial of an expansion there
+  bool in_vain = false;    // whether it has led to nothing
+};
+
 struct SettlementMemory {
   // The negative log density from which the particles were drawn, up to a constant; empty if it is
   // unknown.
   Vector costs;
   OrderInVain order;
+  PriorTried prior;
 };
 
 // Returns what to keep of an order that was tried over `region` and had this error.

@@ -26,7 +26,10 @@ bool IsSummaryFor(const ResolvedProblem& problem, const RecordSummary& summary, 
 }
 
 bool IsMemoryFor(const ResolvedProblem& problem, const SettlementMemory& memory,
-                 const Matrix& particles) {
+                 const Matrix& particles, int64_t rows) {
+  const PriorTried& prior = memory.prior;
+  if (std::min(prior.stays_from, prior.tried) < 0) return false;
+  if (std::max(prior.stays_from, prior.tried) > rows) return false;
   if (memory.costs.size() > 0 &&
       (memory.costs.size() != particles.rows() || !memory.costs.allFinite())) {
     return false;
@@ -45,7 +48,7 @@ bool IsStateFor(const ResolvedProblem& problem, const ComponentState& state) {
   return state.taken > 0 && problem.first_row() <= state.taken && state.windows_from >= 0 &&
          state.windows_from <= state.taken && state.expansion.absorbed.rows == state.taken &&
          state.particles.cols() == problem.dimension() && state.particles.allFinite() &&
-         IsMemoryFor(problem, state.memory, state.particles) && state.weight >= 0 &&
+         IsMemoryFor(problem, state.memory, state.particles, state.taken) && state.weight >= 0 &&
          state.weight <= 1 && state.room >= 1 && state.settlements_at_row >= 0 &&
          IsSummaryFor(problem, state.summary, state.taken) &&
          ReplayAllowance::IsState(state.allowance, state.taken);

@@ -191,6 +191,23 @@ TEST(Snapshot, HoldsAnOrderChosenOnTheWay) {
   EXPECT_GT(outcome.estimates.back().expansion.reexpansions, 0);
 }
 
+// The data tell the sum of c and k far better than each, so that the expansion returns to the
+// prior, at an order above the first.
+TEST(Snapshot, HoldsAnExpansionThatHasReturnedToThePrior) {
+  const Problem problem =
+      TextProblem("x + v*t + 4.9*i*t^2 - c*(0.2*t^2 - 0.002*t^3) - k*(0.08*t^2 - 0.001*t^3)",
+                  {UncertainParameter::Lognormal("c", 0.02, 0.01).value(),
+                   UncertainParameter::Lognormal("k", 0.01, 0.005).value(),
+                   UncertainParameter::Normal("v", 0.4, 0.05).value(),
+                   UncertainParameter::Normal("x", 0, 0.01).value(),
+                   UncertainParameter::Normal("i", 0, 0.001).value()},
+                  8e-4);
+  const auto fall = [](double t) { return 0.004 + 0.41 * t - 0.0025 * t * t + 4e-5 * t * t * t; };
+  const Outcome outcome = ExpectSameBitsThroughRestarts(problem, Record("y", fall, 8e-4, 240), 120);
+  EXPECT_GT(outcome.estimates.back().expansion.order, 3);
+  EXPECT_FALSE(Has(outcome.estimates.back(), DiagnosticCode::kExpansionInaccurate));
+}
+
 TEST(Snapshot, HoldsSeveralComponents) {
   // The frequency tells a² and not its sign.
   Problem problem;
