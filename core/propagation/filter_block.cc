@@ -65,6 +65,12 @@ FilterBlock::FilterBlock(const EnsembleSpecification& specification, const Input
       gain_variance_(members),
       spread_(members),
       whitened_(members),
+      quadrature_(members),
+      scan_(members, std::max<Eigen::Index>(kScanned, 2 * points_.cols())),
+      scanned_(scan_),
+      shift_(members),
+      mean_(members),
+      squeezed_(members),
       alive_(static_cast<size_t>(members), true) {
   part_ends_s_.reserve(kMaxEvenParts);
   gaussians_.mean() = points_.topRows(members);
@@ -277,71 +283,6 @@ void FilterBlock::TakeStatesOf(const FilterBlock& other) {
     block_.LeaveOut(PointsOf(i), "it failed while it took samples");
   }
   NoteFailures();
-}
-
-void FilterBlock::Update(const FilterSamples& samples, Eigen::Index sample, int channel,
-                         MatrixRef innovations, MatrixRef log_variances) {
-  const int members = member_count();
-  const double sigma = samples.noise(channel, sample);
-  auto innovation = innovations.col(sample * samples.values.rows() + channel);
-  auto log_variance = log_variances.col(sample * samples.values.rows() + channel);
-  innovation.segment(first_member_, members).setZero();
-  log_variance.segment(first_member_, members).setZero();
-  if (sigma > 0 && AnyAlive()) {
-    ReadOutputs();
-    SelectOutput(channel);
-    noise_variance_.setConstant(sigma * sigma);
-    if (noise_factors_.size() > 0) noise_variance_ *= noise_factors_.col(channel).square();
-    if (backward_) factor_before_ = gaussians_.factor();
-    const double z = samples.values(channel, sample);
-    if (IsTailed(channel)) {
-      UpdateTailed(z, sigma);
-    } else {
-      UpdateNormal(z, sigma);
-    }
-    innovation.segment(first_member_, members) = innovation_;
-    log_variance.segment(first_member_, members) = variance_;
-  }
-  for (int i = 0; i < members; ++i) {
-    if (alive_[static_cast<size_t>(i)]) continue;
-    innovation[first_member_ + i] = std::numeric_limits<double>::quiet_NaN();
-    log_variance[first_member_ + i] = std::numeric_limits<double>::quiet_NaN();
-  }
-}
-
-// Leaves the whitened innovations in innovation_ and log(S/σ²) in variance_.
-void FilterBlock::UpdateNormal(double z, double sigma) {
-  gaussians_.Update(outputs_, z, noise_variance_, innovation_, variance_);
-  if (backward_) {
-    backward_->AddSample(outputs_, innovation_, variance_, variance_, factor_before_,
-                         gaussians_.factor());
-  }
-  // Roots and logarithms of a vector may differ in the last bit from those of a number, so they
-  // are taken in memory of one alignment.
-  innovation_ /= variance_.sqrt();
-  variance_ = (variance_ / (sigma * sigma)).log();
-}
-
-// As UpdateNormal, with noise of Student's t distribution.
-void FilterBlock::UpdateTailed(double z, double sigma) {
-  variance_.setZero();
-  gaussians_.Compare(outputs_, z, innovation_, variance_);
-  whitened_ = innovation_;
-  for (Eigen::Index i = 0; i < innovation_.size(); ++i) {
-    const HeavyTail::Result result =
-        tail_.Take(innovation_[i], variance_[i], std::sqrt(noise_variance_[i]), sigma);
-    whitened_[i] = result.innovation;
-    variance_[i] = result.log_variance;
-    gain_variance_[i] = result.gain_variance;
-    noise_variance_[i] = result.noise_variance;
-    spread_[i] = result.spread;
-  }
-  gaussians_.Correct(innovation_, gain_variance_, noise_variance_);
-  if (backward_) {
-    backward_->AddSample(outputs_, innovation_, gain_variance_, spread_, factor_before_,
-                         gaussians_.factor());
-  }
-  innovation_ = whitened_;
 }
 
 // The columns are the states, the means and the factors.

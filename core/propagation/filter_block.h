@@ -8,7 +8,9 @@
 // with independent white process noises of spectral densities q (one for each state) and e_k ~
 // N(0, 1), or Student's t (heavy_tail.h), where r is a sample's variance times the square of a
 // member's own factor. The filters are square-root cubature Kalman filters (gaussian_states.h):
-// exact for models that are linear in their states, and without Jacobians. They begin at t = 0 with
+// exact for models that are linear in their states, and without Jacobians. Where an output is
+// curved over the width of what is known of the states, its likelihood and what it tells are
+// integrated (output_quadrature.h). They begin at t = 0 with
 // the model's initial states, which are known exactly (P = 0); what is uncertain of them is an
 // uncertain parameter.
 //
@@ -33,6 +35,7 @@
 #include "core/propagation/backward_pass.h"
 #include "core/propagation/gaussian_states.h"
 #include "core/propagation/heavy_tail.h"
+#include "core/propagation/output_quadrature.h"
 #include "core/propagation/trajectory_block.h"
 #include "core/propagation/trajectory_ensemble.h"
 #include "polyest/stop.h"
@@ -115,12 +118,23 @@ class FilterBlock {
               MatrixRef log_variances);
   void UpdateNormal(double z, double sigma);
   void UpdateTailed(double z, double sigma);
+  bool IsCurved(int channel, double z);
+  void ReadAlong(const Eigen::ArrayXXd& s, Eigen::Index count, int channel,
+                 Eigen::ArrayXXd& values);
+  void UpdateCurved(int channel, double z, double sigma);
+  void FindLine(int channel);
+  void ReadDrawn(int channel, Eigen::Ref<Eigen::ArrayXXd> values);
+  void TakeIntegral(Eigen::Index member, double z, double sigma, bool tailed);
+  void AddCurvedSample();
   bool IsTailed(int channel) const {
     return !specification_.heavy_tailed.empty() &&
            specification_.heavy_tailed[static_cast<size_t>(channel)];
   }
   void NoteFailures();
   int member_count() const { return static_cast<int>(gaussians_.members()); }
+
+  // Points along a line at which an output is looked at for curvature.
+  static constexpr Eigen::Index kScanned = 4;
 
   const int first_member_;
   EnsembleSpecification specification_;  // of the points, 2n for each member
@@ -139,9 +153,12 @@ class FilterBlock {
   Eigen::ArrayXd outputs_, noise_variance_, innovation_, variance_;
   HeavyTail tail_;
   Eigen::ArrayXd gain_variance_, spread_, whitened_;  // as it gives them, by member
-  std::unique_ptr<BackwardPass> backward_;            // null unless StartBackward was called
-  Eigen::ArrayXXd factor_before_;                     // of the stage that is added to it
-  std::vector<bool> alive_;                           // by member
+  OutputQuadrature quadrature_;
+  Eigen::ArrayXXd scan_, scanned_;          // s and the outputs there, members × points on a line
+  Eigen::ArrayXd shift_, mean_, squeezed_;  // μ, E and V, by member
+  std::unique_ptr<BackwardPass> backward_;  // null unless StartBackward was called
+  Eigen::ArrayXXd factor_before_;           // of the stage that is added to it
+  std::vector<bool> alive_;                 // by member
   size_t failures_seen_ = 0;
   std::vector<PointFailure> failures_;
 };

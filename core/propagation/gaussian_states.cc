@@ -3,6 +3,12 @@
 #include <cmath>
 
 namespace polyest::internal {
+namespace {
+
+// A gradient so small beside the slope over the points says nothing of the direction.
+constexpr double kLeastGradient = 1e-6;
+
+}  // namespace
 
 GaussianStates::GaussianStates(Eigen::Index members, Eigen::Index states)
     : mean_(Eigen::ArrayXXd::Zero(members, states)),
@@ -10,6 +16,9 @@ GaussianStates::GaussianStates(Eigen::Index members, Eigen::Index states)
       vectors_(members, (2 * states + 1) * states),
       gain_(members, states),
       deviation_(members, 2 * states),
+      direction_(members, states),
+      along_(members, states),
+      slope_(members),
       length_(members),
       inverse_(members),
       product_(members) {}
@@ -46,9 +55,9 @@ void GaussianStates::Diffuse(const Eigen::ArrayXXd& spectral_densities, double d
   }
 }
 
-void GaussianStates::Draw(Eigen::ArrayXXd& points) const {
+void GaussianStates::Draw(Eigen::ArrayXXd& points, double part) const {
   const Eigen::Index n = states(), m = members();
-  const double root = std::sqrt(static_cast<double>(n));
+  const double root = part * std::sqrt(static_cast<double>(n));
   for (Eigen::Index i = 0; i < n; ++i) {
     for (Eigen::Index j = 0; j < n; ++j) {
       auto plus = points.col(i).segment(j * m, m);
@@ -128,6 +137,78 @@ void GaussianStates::Correct(const Eigen::ArrayXd& innovation, const Eigen::Arra
     vectors_.col(Component(i, 2 * n)) = r * gain_.col(i);
   }
   Triangularize(2 * n + 1);
+}
+
+const Eigen::ArrayXd& GaussianStates::FindDirection() {
+  const Eigen::Index n = states();
+  const double half = std::sqrt(0.5);
+  slope_.setZero();
+  for (Eigen::Index j = 0; j < n; ++j) {
+    direction_.col(j) = half * (deviation_.col(j) - deviation_.col(n + j));
+    slope_ += direction_.col(j).square();
+  }
+  slope_ = slope_.sqrt();
+  for (Eigen::Index j = 0; j < n; ++j) {
+    direction_.col(j) = (slope_ > 0).select(direction_.col(j) / slope_, n == 1 ? 1 : 0);
+  }
+  LookAlong();
+  return slope_;
+}
+
+void GaussianStates::TurnToGradient(const Eigen::ArrayXXd& outputs, double part) {
+  const Eigen::Index n = states();
+  const double half = 0.5 / (part * std::sqrt(static_cast<double>(n)));
+  gain_ = half * (outputs.leftCols(n) - outputs.middleCols(n, n));
+  length_ = gain_.square().rowwise().sum().sqrt();
+  for (Eigen::Index j = 0; j < n; ++j) {
+    direction_.col(j) =
+        (length_ > kLeastGradient * slope_).select(gain_.col(j) / length_, direction_.col(j));
+  }
+  LookAlong();
+}
+
+// Sets L u.
+void GaussianStates::LookAlong() {
+  for (Eigen::Index i = 0; i < states(); ++i) {
+    along_.col(i).setZero();
+    for (Eigen::Index j = 0; j <= i; ++j) along_.col(i) += L(i, j) * direction_.col(j);
+  }
+}
+
+void GaussianStates::DrawAlong(const Eigen::Ref<const Eigen::ArrayXXd>& s,
+                               Eigen::ArrayXXd& points) const {
+  const Eigen::Index n = states(), m = members();
+  for (Eigen::Index i = 0; i < n; ++i) {
+    for (Eigen::Index k = 0; k < 2 * n; ++k) {
+      auto component = points.col(i).segment(k * m, m);
+      component = mean_.col(i);
+      if (k < s.cols()) component += s.col(k) * along_.col(i);
+    }
+  }
+}
+
+void GaussianStates::ProjectionsTo(Eigen::ArrayXXd& s) const {
+  const Eigen::Index n = states();
+  const double root = std::sqrt(static_cast<double>(n));
+  for (Eigen::Index j = 0; j < n; ++j) {
+    s.col(j) = root * direction_.col(j);
+    s.col(n + j) = -root * direction_.col(j);
+  }
+}
+
+void GaussianStates::Squeeze(const Eigen::ArrayXd& mean, const Eigen::ArrayXd& variance) {
+  const Eigen::Index n = states();
+  // L (I + (√V − 1) u uᵀ)
+  product_ = variance.sqrt() - 1;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    mean_.col(i) += mean * along_.col(i);
+    for (Eigen::Index j = 0; j < n; ++j) {
+      auto component = vectors_.col(Component(i, j));
+      component = product_ * along_.col(i) * direction_.col(j);
+      if (j <= i) component += L(i, j);
+    }
+  }
+  Triangularize(n);
 }
 
 // Sets L with L Lᵀ = Σ v vᵀ over the first `vectors` vectors, which it uses up. Component i of all

@@ -46,8 +46,8 @@ class GaussianStates {
   // Adds `spectral_densities` (members × n, of independent noises) times `duration_s` to P.
   void Diffuse(const Eigen::ArrayXXd& spectral_densities, double duration_s);
   // Writes the points: row s · members + i of `points` (at least 2n · members rows, n columns) is
-  // X_s of member i.
-  void Draw(Eigen::ArrayXXd& points) const;
+  // X_s of member i, or with a `part` below 1 the point at that part of the way from m to X_s.
+  void Draw(Eigen::ArrayXXd& points, double part = 1) const;
   // Takes mean and covariance of points that Draw wrote and the model has moved.
   void Collect(const Eigen::ArrayXXd& points);
   // Takes one sample into account. `outputs` (at least 2n · members) are the values at the points
@@ -63,6 +63,20 @@ class GaussianStates {
                Eigen::ArrayXd& variance);
   void Correct(const Eigen::ArrayXd& innovation, const Eigen::ArrayXd& variance, Eigen::ArrayXd& r);
 
+  // For a sample of a curved output (output_quadrature.h). FindDirection, after Compare, takes for
+  // u the unit vector in which the output changes most with ε, x = m + L ε, by the outputs at the
+  // points, and returns the slopes c there (members); where c is 0, u is 0, and 1 for a single
+  // state. TurnToGradient takes for u the gradient at m instead, by the outputs at points that were
+  // drawn with `part`, unless it is almost 0 there: for a function of one combination of the states
+  // that is its direction, however curved it is. DrawAlong writes m + L u s for `count` ≤ 2n
+  // columns of s (members × count) into rows as Draw's; the rest is m. ProjectionsTo writes uᵀ ε of
+  // the 2n points. Squeeze takes m ← m + E L u, P ← L (I − (1 − V) u uᵀ) Lᵀ.
+  const Eigen::ArrayXd& FindDirection();
+  void TurnToGradient(const Eigen::ArrayXXd& outputs, double part);
+  void DrawAlong(const Eigen::Ref<const Eigen::ArrayXXd>& s, Eigen::ArrayXXd& points) const;
+  void ProjectionsTo(Eigen::ArrayXXd& s) const;
+  void Squeeze(const Eigen::ArrayXd& mean, const Eigen::ArrayXd& variance);
+
  private:
   auto L(Eigen::Index i, Eigen::Index j) { return factor_.col(FactorColumn(states(), i, j)); }
   auto L(Eigen::Index i, Eigen::Index j) const { return factor_.col(FactorColumn(states(), i, j)); }
@@ -70,13 +84,16 @@ class GaussianStates {
   Eigen::Index Component(Eigen::Index i, Eigen::Index vector) const {
     return vector * states() + i;
   }
+  void LookAlong();
   void Triangularize(Eigen::Index vectors);
 
   Eigen::ArrayXXd mean_, factor_;
   // Members × (2n + 1) n: vectors v with P = Σ v vᵀ.
   Eigen::ArrayXXd vectors_;
-  Eigen::ArrayXXd gain_;       // members × n
-  Eigen::ArrayXXd deviation_;  // members × 2n, of the outputs
+  Eigen::ArrayXXd gain_;               // members × n
+  Eigen::ArrayXXd deviation_;          // members × 2n, of the outputs
+  Eigen::ArrayXXd direction_, along_;  // u and L u, members × n
+  Eigen::ArrayXd slope_;               // c
   Eigen::ArrayXd length_, inverse_, product_;
 };
 

@@ -212,13 +212,24 @@ void TrajectoryBlock::SelectOutputs() {
   }
 }
 
-void TrajectoryBlock::SetStates(const Eigen::ArrayXXd& states) {
+void TrajectoryBlock::CopyStates(const Eigen::ArrayXXd& states) {
   for (Eigen::Index column = 0; column < states_.cols(); ++column) {
     for (Eigen::Index row = 0; row < states_.rows(); ++row) {
       states_(row, column) = states(source_[row], column);
     }
   }
+}
+
+void TrajectoryBlock::SetStates(const Eigen::ArrayXXd& states) {
+  CopyStates(states);
   FailRowsBeyond(states_, time_s_, "a state");
+}
+
+const Eigen::ArrayXXd& TrajectoryBlock::OutputsAt(const Eigen::ArrayXXd& states) {
+  CopyStates(states);
+  model_->Outputs(time_s_, states_, parameters_, inputs_.At(time_s_), model_outputs_);
+  SelectOutputs();
+  return selected_outputs_;
 }
 
 void TrajectoryBlock::SetTime(double time_s) {

@@ -56,6 +56,9 @@ class TrajectoryBlock final : public BlockSystem {
   // Returns the outputs that are read (rows × outputs), of the states set last. A point without
   // finite outputs fails.
   const Eigen::ArrayXXd& OutputsOfStates();
+  // Returns the outputs at other states (rows × states) at the present time, which need not be
+  // finite. The states must be set again before the block goes on.
+  const Eigen::ArrayXXd& OutputsAt(const Eigen::ArrayXXd& states);
   // Advances the states set last to `time_s` ≥ the present time and returns them (rows × states).
   absl::StatusOr<const Eigen::ArrayXXd*> Move(double time_s, const Stop& stop);
   // Leaves out those of the points that have not failed yet.
@@ -78,6 +81,7 @@ class TrajectoryBlock final : public BlockSystem {
     bool is_break = false;  // of an input, rather than a time at which to look
   };
 
+  void CopyStates(const Eigen::ArrayXXd& states);
   void StartIntegrator(double time_s);
   bool MayChangeMethod() const;
   StopTime NextStop();

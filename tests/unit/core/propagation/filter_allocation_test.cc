@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "core/propagation/filter_bank.h"
+#include "polyest/equation_model.h"
 #include "tests/testing/count_allocations.h"
 #include "tests/unit/core/propagation/ensemble.h"
 
@@ -11,10 +12,15 @@
 namespace polyest::internal {
 namespace {
 
-// Returns how often memory is allocated for 20 samples, after the first 5.
-int AllocationsOf(IntegrationMethod method) {
+Ensemble Oscillators(IntegrationMethod method) {
   Ensemble ensemble("mass_spring_damper", 20, {"x", "v"});
   ensemble.specification.integration.method = method;
+  return ensemble;
+}
+
+// Returns how often memory is allocated for 20 samples, after the first 5, of 20 filters of two
+// outputs and two states.
+int AllocationsOf(Ensemble ensemble) {
   ensemble.specification.process_noise.setConstant(20, 2, 0.01);
   const int at_first = testing::allocations;
   FilterBank bank(ensemble.specification, &ensemble.inputs);
@@ -38,11 +44,17 @@ int AllocationsOf(IntegrationMethod method) {
 }
 
 TEST(FilterAllocation, IsNoneForASampleOfALinearModel) {
-  EXPECT_EQ(AllocationsOf(IntegrationMethod::kAuto), 0);
+  EXPECT_EQ(AllocationsOf(Oscillators(IntegrationMethod::kAuto)), 0);
 }
 
 TEST(FilterAllocation, IsNoneForASampleThatIsIntegrated) {
-  EXPECT_EQ(AllocationsOf(IntegrationMethod::kExplicit), 0);
+  EXPECT_EQ(AllocationsOf(Oscillators(IntegrationMethod::kExplicit)), 0);
+}
+
+TEST(FilterAllocation, IsNoneForASampleOfACurvedOutput) {
+  const EquationSpecification curved{.states = {{"x", "v"}, {"v", "-x - 0.1*v"}},
+                                     .outputs = {{"y", "tanh(20*x)"}, {"z", "exp(10*v)"}}};
+  EXPECT_EQ(AllocationsOf(Ensemble(MakeEquationModel(curved).value(), 20, {"y", "z"})), 0);
 }
 
 }  // namespace
