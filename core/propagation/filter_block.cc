@@ -71,6 +71,7 @@ FilterBlock::FilterBlock(const EnsembleSpecification& specification, const Input
       shift_(members),
       mean_(members),
       squeezed_(members),
+      has_line_(static_cast<size_t>(members), true),
       alive_(static_cast<size_t>(members), true) {
   part_ends_s_.reserve(kMaxEvenParts);
   gaussians_.mean() = points_.topRows(members);

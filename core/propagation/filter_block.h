@@ -158,6 +158,7 @@ class FilterBlock {
   Eigen::ArrayXd shift_, mean_, squeezed_;  // μ, E and V, by member
   std::unique_ptr<BackwardPass> backward_;  // null unless StartBackward was called
   Eigen::ArrayXXd factor_before_;           // of the stage that is added to it
+  std::vector<bool> has_line_;              // by member: whether it is integrated
   std::vector<bool> alive_;                 // by member
   size_t failures_seen_ = 0;
   std::vector<PointFailure> failures_;

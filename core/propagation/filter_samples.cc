@@ -15,6 +15,10 @@ constexpr double kScanReach = 3;
 // Departure from a straight line there that matters, in standard deviations of the noise: at one
 // standard deviation of the states it is about a tenth of this for a parabola.
 constexpr double kCurved = 0.01;
+// Variance of what an output has beside its line, in that of the noise, up to which it is
+// integrated along the line. Beyond, it is one of several combinations of the states, and the line
+// says less of it than the filter's points do.
+constexpr double kBesideLine = 0.1;
 // Part of the way to the filters' points over which the gradient is taken.
 constexpr double kGradientPart = 1e-3;
 constexpr double kOutputRounding = 64 * std::numeric_limits<double>::epsilon();
@@ -145,7 +149,7 @@ bool FilterBlock::IsCurved(int channel, double z) {
 // Takes a sample of a curved output; results as UpdateNormal's.
 void FilterBlock::UpdateCurved(int channel, double z, double sigma) {
   FindLine(channel);
-  quadrature_.Begin(z, sigma, IsTailed(channel), noise_variance_, shift_, alive_);
+  quadrature_.Begin(z, sigma, IsTailed(channel), noise_variance_, shift_, has_line_);
   do {
     ReadAlong(quadrature_.nodes(), OutputQuadrature::kNodes, channel, quadrature_.values());
   } while (quadrature_.Refine());
@@ -156,9 +160,11 @@ void FilterBlock::UpdateCurved(int channel, double z, double sigma) {
 }
 
 // Turns u to the gradient, sets shift_ to μ, and adds V_d to noise_variance_: what the outputs at
-// the filters' points have beside those of the points' projections onto the line.
+// the filters' points have beside those of the points' projections onto the line. Where that is too
+// much, has_line_ becomes false.
 void FilterBlock::FindLine(int channel) {
   shift_.setZero();
+  has_line_ = alive_;
   const Eigen::Index n = gaussians_.states(), members = member_count();
   if (n == 1) return;
   gaussians_.Draw(points_, kGradientPart);
@@ -172,9 +178,13 @@ void FilterBlock::FindLine(int channel) {
   for (Eigen::Index i = 0; i < members; ++i) {
     const auto apart = scanned_.row(i).head(2 * n);
     const double mean = apart.mean(), variance = (apart - mean).square().mean();
-    if (!std::isfinite(variance)) continue;
-    shift_[i] = mean;
-    noise_variance_[i] += variance;
+    if (variance <= kBesideLine * noise_variance_[i]) {
+      shift_[i] = mean;
+      noise_variance_[i] += variance;
+    } else {
+      gaussians_.TurnBack(i);
+      has_line_[static_cast<size_t>(i)] = false;
+    }
   }
 }
 

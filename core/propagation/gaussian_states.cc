@@ -18,6 +18,7 @@ GaussianStates::GaussianStates(Eigen::Index members, Eigen::Index states)
       deviation_(members, 2 * states),
       direction_(members, states),
       along_(members, states),
+      former_(members, states),
       slope_(members),
       length_(members),
       inverse_(members),
@@ -158,6 +159,7 @@ const Eigen::ArrayXd& GaussianStates::FindDirection() {
 void GaussianStates::TurnToGradient(const Eigen::ArrayXXd& outputs, double part) {
   const Eigen::Index n = states();
   const double half = 0.5 / (part * std::sqrt(static_cast<double>(n)));
+  former_ = direction_;
   gain_ = half * (outputs.leftCols(n) - outputs.middleCols(n, n));
   length_ = gain_.square().rowwise().sum().sqrt();
   for (Eigen::Index j = 0; j < n; ++j) {
@@ -165,6 +167,16 @@ void GaussianStates::TurnToGradient(const Eigen::ArrayXXd& outputs, double part)
         (length_ > kLeastGradient * slope_).select(gain_.col(j) / length_, direction_.col(j));
   }
   LookAlong();
+}
+
+void GaussianStates::TurnBack(Eigen::Index member) {
+  direction_.row(member) = former_.row(member);
+  for (Eigen::Index i = 0; i < states(); ++i) {
+    along_(member, i) = 0;
+    for (Eigen::Index j = 0; j <= i; ++j) {
+      along_(member, i) += L(i, j)[member] * direction_(member, j);
+    }
+  }
 }
 
 // Sets L u.

@@ -68,11 +68,13 @@ class GaussianStates {
   // points, and returns the slopes c there (members); where c is 0, u is 0, and 1 for a single
   // state. TurnToGradient takes for u the gradient at m instead, by the outputs at points that were
   // drawn with `part`, unless it is almost 0 there: for a function of one combination of the states
-  // that is its direction, however curved it is. DrawAlong writes m + L u s for `count` ≤ 2n
-  // columns of s (members × count) into rows as Draw's; the rest is m. ProjectionsTo writes uᵀ ε of
-  // the 2n points. Squeeze takes m ← m + E L u, P ← L (I − (1 − V) u uᵀ) Lᵀ.
+  // that is its direction, however curved it is. TurnBack undoes that for one member. DrawAlong
+  // writes m + L u s for `count` ≤ 2n columns of s (members × count) into rows as Draw's; the rest
+  // is m. ProjectionsTo writes uᵀ ε of the 2n points. Squeeze takes m ← m + E L u, P ← L (I − (1 −
+  // V) u uᵀ) Lᵀ.
   const Eigen::ArrayXd& FindDirection();
   void TurnToGradient(const Eigen::ArrayXXd& outputs, double part);
+  void TurnBack(Eigen::Index member);
   void DrawAlong(const Eigen::Ref<const Eigen::ArrayXXd>& s, Eigen::ArrayXXd& points) const;
   void ProjectionsTo(Eigen::ArrayXXd& s) const;
   void Squeeze(const Eigen::ArrayXd& mean, const Eigen::ArrayXd& variance);
@@ -93,6 +95,7 @@ class GaussianStates {
   Eigen::ArrayXXd gain_;               // members × n
   Eigen::ArrayXXd deviation_;          // members × 2n, of the outputs
   Eigen::ArrayXXd direction_, along_;  // u and L u, members × n
+  Eigen::ArrayXXd former_;             // u before TurnToGradient
   Eigen::ArrayXd slope_;               // c
   Eigen::ArrayXd length_, inverse_, product_;
 };
