@@ -282,7 +282,7 @@ TEST(ExperimentDesign, RefusalNamesFieldValueAndRule) {
   };
   EXPECT_THAT(refusal([](auto& o) { o.until_s = 0; }), HasSubstr("until_s: 0 must"));
   EXPECT_THAT(refusal([](auto& o) { o.samples = 0; }), HasSubstr("samples: 0 must"));
-  EXPECT_THAT(refusal([](auto& o) { o.samples = 1001; }), HasSubstr("1 and 1000"));
+  EXPECT_THAT(refusal([](auto& o) { o.samples = 1001; }), HasSubstr("1 to 1000"));
   EXPECT_THAT(refusal([](auto& o) {
                 o.possible = {{"w", {}}};
               }),
