@@ -200,9 +200,9 @@ TEST(Snapshot, HoldsAnExpansionThatHasReturnedToThePrior) {
                    UncertainParameter::Normal("v", 0.4, 0.05).value(),
                    UncertainParameter::Normal("x", 0, 0.01).value(),
                    UncertainParameter::Normal("i", 0, 0.001).value()},
-                  8e-4);
+                  2e-3);
   const auto fall = [](double t) { return 0.004 + 0.41 * t - 0.0025 * t * t + 4e-5 * t * t * t; };
-  const Outcome outcome = ExpectSameBitsThroughRestarts(problem, Record("y", fall, 8e-4, 240), 120);
+  const Outcome outcome = ExpectSameBitsThroughRestarts(problem, Record("y", fall, 2e-3, 96), 48);
   EXPECT_GT(outcome.estimates.back().expansion.order, 3);
   EXPECT_FALSE(Has(outcome.estimates.back(), DiagnosticCode::kExpansionInaccurate));
 }
