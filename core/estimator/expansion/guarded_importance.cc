@@ -242,6 +242,7 @@ class GuardedImportance {
   // Returns a Gaussian for each minimum that matters and one around all of them; nothing if the
   // curvature does not give one, or if a part of what matters is out of reach.
   std::optional<std::vector<GaussianMode>> FindModes() {
+    if (!Modes()) return std::nullopt;  // others would not give these their Gaussians
     FindMore();
     std::optional<std::vector<GaussianMode>> modes = Modes();
     if (!modes) return std::nullopt;
