@@ -80,6 +80,13 @@ class ImportCallTest : public testing::Test {
     rows.mutable_channels(0)->add_values(0.1);
     return record;
   }
+  // Tells the code of the call's end, before which the session must be gone.
+  Reader::OnFinish TellAfterSessionIsGone(std::promise<grpc::StatusCode>& finished) {
+    return [this, &finished](const grpc::Status& status) {
+      EXPECT_TRUE(absl::IsNotFound(journal_.ReadProblem(1).status()));
+      finished.set_value(status.error_code());
+    };
+  }
   // Makes a context that lets in everybody, or whoever has a token.
   ServiceContext Context(const std::string& token_file = "") {
     access_ = AccessControl::Open({.token_file = token_file}).value();
@@ -110,11 +117,7 @@ TEST_F(ImportCallTest, KeepsNothingWhenItIsCancelledWhileARecordIsTaken) {
   ServiceContext context = Context();
   auto* const import = new ImportCall(context, call_, &imported_);
   std::promise<grpc::StatusCode> finished;
-  Reader reader(*import, [&](const grpc::Status& status) {
-    // The session is gone before the call ends.
-    EXPECT_TRUE(absl::IsNotFound(journal_.ReadProblem(1).status()));
-    finished.set_value(status.error_code());
-  });
+  Reader reader(*import, TellAfterSessionIsGone(finished));
   reader.Give(Head());
   journal_.Hold();
   reader.Give(Batch());
@@ -129,10 +132,7 @@ TEST_F(ImportCallTest, KeepsNothingWhenItIsCancelledBetweenTwoRecords) {
   ServiceContext context = Context();
   auto* const import = new ImportCall(context, call_, &imported_);
   std::promise<grpc::StatusCode> finished;
-  Reader reader(*import, [&](const grpc::Status& status) {
-    EXPECT_TRUE(absl::IsNotFound(journal_.ReadProblem(1).status()));
-    finished.set_value(status.error_code());
-  });
+  Reader reader(*import, TellAfterSessionIsGone(finished));
   reader.Give(Head());
   reader.Await();
   std::promise<void> free;
