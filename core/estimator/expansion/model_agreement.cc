@@ -4,6 +4,9 @@
 #include <cmath>
 #include <vector>
 
+#include "core/bayes/cost_minima.h"
+#include "core/estimator/expansion/search_domain.h"
+
 namespace polyest::internal {
 namespace {
 
@@ -11,6 +14,42 @@ constexpr double kMinEffectiveChecks = 2;  // for the spread over them to be mea
 constexpr double kMaxSpreadOfMean =
     0.25;  // standard deviation of ΔJ at which its mean counts as known
 constexpr double kNegligibleWeight = 1e-3;  // weight of a check point relative to the heaviest
+// The check points no longer represent the posterior when the nearest one is so many standard
+// deviations beyond √n away from its mode.
+constexpr double kReachOfChecks = 2;
+constexpr double kMaxLag1Correlation = 0.99;
+
+Minimum MinimumOf(const ExpansionDesign& design, const Cost& cost) {
+  const Matrix start = design.reference.transpose();
+  return FindMinimaOf(cost, SearchOf(cost, design), start, Stop()).front();
+}
+
+// Returns √((1 + r)/(1 − r)) with the largest lag-1 correlation r ≥ 0 of a channel's residuals at
+// d.
+double GainByCorrelation(const RegionalExpansion& expansion, const Vector& d) {
+  double r = 0;
+  for (const ChannelSums& sums : expansion.sums()) r = std::max(r, sums.Lag1Correlation(d));
+  r = std::min(r, kMaxLag1Correlation);
+  return std::sqrt((1 + r) / (1 - r));
+}
+
+// What the residuals of the expansion at its check points say of a shift.
+struct ShiftOfResiduals {
+  double bound = 0;
+  bool checks_represent = true;  // whether check points are where the posterior is
+};
+
+ShiftOfResiduals BoundByResiduals(const RegionalExpansion& expansion, const Cost& cost,
+                                  const CheckDifferences& checks) {
+  const auto samples = static_cast<double>(expansion.Checks().samples);
+  const double norm = checks.residuals.maxCoeff() * std::sqrt(samples);
+  const double of_variances = cost.power() * expansion.LogVarianceError();
+  if (!(norm > kNegligibleShift)) return {norm + of_variances, true};  // the rest costs a search
+  const Minimum minimum = MinimumOf(expansion.design(), cost);
+  const double gain = GainByCorrelation(expansion, cost.BasisDifference(minimum.point));
+  const double nearest = std::sqrt(2 * std::max(0.0, checks.totals.minCoeff() - minimum.value));
+  return {gain * norm + of_variances, nearest <= std::sqrt(cost.dimension()) + kReachOfChecks};
+}
 
 }  // namespace
 
@@ -37,13 +76,14 @@ CheckDifferences DifferencesAtChecks(const RegionalExpansion& expansion, const C
   const ExpansionDesign& design = expansion.design();
   const RegionalExpansion::Check check = expansion.Checks();
   std::vector<Eigen::Index> rows;
-  std::vector<double> log_weights, differences, residuals;
+  std::vector<double> totals, log_weights, differences, residuals;
   for (Eigen::Index i = 0; i < design.check_points.rows(); ++i) {
     if (!check.valid[static_cast<size_t>(i)]) continue;
     const Vector eta = design.check_points.row(i).transpose();
     const CostValue value = cost.Evaluate(eta);
     if (!std::isfinite(value.total)) continue;
     rows.push_back(i);
+    totals.push_back(value.total);
     log_weights.push_back(design.check_costs[i] - value.total);
     differences.push_back(cost.power() * (ModelMismatch(expansion, cost.BasisDifference(eta),
                                                         check.chi_squared.row(i).transpose()) -
@@ -53,8 +93,8 @@ CheckDifferences DifferencesAtChecks(const RegionalExpansion& expansion, const C
   const auto vector = [](const std::vector<double>& values) {
     return Vector(Eigen::Map<const Vector>(values.data(), std::ssize(values)));
   };
-  return {design.check_points(rows, Eigen::all), vector(log_weights), vector(differences),
-          vector(residuals)};
+  return {design.check_points(rows, Eigen::all), vector(totals), vector(log_weights),
+          vector(differences), vector(residuals)};
 }
 
 Agreement AgreementWithModel(const RegionalExpansion& expansion, const Cost& cost) {
@@ -73,10 +113,9 @@ Agreement AgreementWithModel(const RegionalExpansion& expansion, const Cost& cos
   const double mean = weights.dot(checks.differences);
   const double spread =
       std::sqrt(weights.dot((checks.differences.array() - mean).square().matrix()));
-  const auto samples = static_cast<double>(expansion.Checks().samples);
-  agreement.shift = checks.residuals.maxCoeff() * std::sqrt(samples) +
-                    cost.power() * expansion.LogVarianceError();
-  if (1 >= kMinEffectiveChecks * weights.squaredNorm()) {
+  const ShiftOfResiduals residuals = BoundByResiduals(expansion, cost, checks);
+  agreement.shift = residuals.bound;
+  if (residuals.checks_represent && 1 >= kMinEffectiveChecks * weights.squaredNorm()) {
     const double carried = std::sqrt(cost.power() * expansion.CarriedError());
     agreement.shift = std::min(agreement.shift, spread + carried);
     if (spread <= kMaxSpreadOfMean) agreement.mean_difference = mean;

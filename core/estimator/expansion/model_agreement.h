@@ -23,7 +23,8 @@ inline constexpr double kNegligibleShift = 0.01;
 
 // What the check points say that could be integrated and have a finite cost, C' of them.
 struct CheckDifferences {
-  Matrix etas;  // C' × n, local coordinates
+  Matrix etas;    // C' × n, local coordinates
+  Vector totals;  // J of the expansion
   Vector
       log_weights;  // log of e^{−J} over the density that they were drawn from, J of the expansion
   Vector differences;  // ΔJ = J_mismatch of the model − of the expansion, times the cost's power
@@ -35,12 +36,16 @@ CheckDifferences DifferencesAtChecks(const RegionalExpansion& expansion, const C
 // error of a posterior mean, in units of its standard deviation, is bounded by each of
 //   the standard deviation over the posterior of ΔJ = J_mismatch of the model − of the expansion
 //   (at the expansion's lag-1 correlation, where that enters; times the power of the likelihood),
-//   ‖(model − expansion)/σ‖ over the samples; of the fit itself if there are no check points; with
+//   ‖(model − expansion)/σ‖ √((1 + r)/(1 − r)) over the samples, r the lag-1 correlation of the
+//   residuals at the minimum of the cost; of the fit itself if there are no check points; with
 //   filters, plus the error of ½ Σ log(S/σ²).
 // Both bounds follow from the Cauchy–Schwarz inequality, over particles and over samples. The first
-// is sharper but needs check points where the posterior is. The second holds wherever they are. Of
-// sums taken over from an expansion over another region, the check points know nothing; the first
-// bound is increased by √(β Σ ρ_k/R_k) of those, and the second contains it (carry_over.h).
+// is sharper but needs check points where the posterior is, also within √n + 2 standard deviations
+// of its mode. The second holds wherever they are. Its factor counts where residuals are not noise
+// but a misfit, which may look like the error of the expansion: N samples then tell no more than
+// N (1 − r)/(1 + r) independent ones. Of sums taken over from an expansion over another region, the
+// check points know nothing; the first bound is increased by √(β Σ ρ_k/R_k) of those, and the
+// second contains it (carry_over.h).
 struct Agreement {
   double shift = 0;  // the smaller of the available bounds, ≥ 0
   // Mean of ΔJ over the posterior, if the check points determine it to 0.25: the change of the
