@@ -26,7 +26,7 @@ absl::StatusOr<std::unique_ptr<ComponentMixture>> ComponentMixture::FromState(
     const ResolvedProblem& problem, MixtureState state, int64_t rows, const SampleStore* store,
     int threads, const Stop& stop) {
   const bool several = state.components.size() > 1;
-  if (state.components.empty() || std::ssize(state.components) > MostComponents(problem) ||
+  if (state.components.empty() || std::ssize(state.components) > MaxComponents(problem) ||
       (several && state.weighing_row <= rows)) {
     return absl::DataLossError("the snapshot's components cannot be of a mixture");
   }
@@ -139,13 +139,13 @@ absl::Status ComponentMixture::Weigh(const Stop& stop) {
   for (const auto& component : components_) {
     POLYEST_RETURN_IF_ERROR(component->MakeComparable(stop));
   }
-  const int most = MostComponents(components_.front()->problem());
+  const int max_components = MaxComponents(components_.front()->problem());
   POLYEST_ASSIGN_OR_RETURN(const std::vector<Matrix> particles,
-                           KeepHeaviest(components_, 1, static_cast<size_t>(most), stop));
+                           KeepHeaviest(components_, 1, static_cast<size_t>(max_components), stop));
   POLYEST_RETURN_IF_ERROR(Unite(particles, stop));
   FreeBounds(particles);
   for (const auto& component : components_) {
-    component->set_room(std::max(1, most / static_cast<int>(components_.size())));
+    component->set_room(std::max(1, max_components / static_cast<int>(components_.size())));
   }
   weighing_row_ = NextWindow(weighing_row_);
   return absl::OkStatus();
@@ -193,13 +193,13 @@ void ComponentMixture::FreeBounds(const std::vector<Matrix>& particles) {
   for (size_t k = 0; k < freed.size(); ++k) components_[k]->set_element(std::move(freed[k]));
 }
 
-// Keeps the `most` heaviest components and returns the particles of each. `weight` is the weight of
-// all of them together.
+// Keeps at most `max_kept` components, the heaviest, and returns the particles of each. `weight` is
+// the weight of all of them together.
 absl::StatusOr<std::vector<Matrix>> ComponentMixture::KeepHeaviest(Components& components,
-                                                                   double weight, size_t most,
+                                                                   double weight, size_t max_kept,
                                                                    const Stop& stop) {
   POLYEST_ASSIGN_OR_RETURN(MixtureWeighing weighing,
-                           WeighMixture(Requests(components), most, stop));
+                           WeighMixture(Requests(components), max_kept, stop));
   Components kept;
   for (size_t i = 0; i < weighing.kept.size(); ++i) {
     kept.push_back(std::move(components[weighing.kept[i]]));

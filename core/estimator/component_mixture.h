@@ -62,7 +62,7 @@ class ComponentMixture {
   absl::Status Divide(size_t component, const Stop& stop);
   absl::Status Weigh(const Stop& stop);
   absl::StatusOr<std::vector<Matrix>> KeepHeaviest(Components& components, double weight,
-                                                   size_t most, const Stop& stop);
+                                                   size_t max_kept, const Stop& stop);
   absl::Status Unite(const std::vector<Matrix>& particles, const Stop& stop);
   std::vector<const Element*> ElementsBeside(size_t component) const;
   void FreeBounds(const std::vector<Matrix>& particles);

@@ -13,7 +13,7 @@ namespace polyest::internal {
 namespace {
 
 constexpr double kMinMisfit = 3;
-constexpr double kPatience = 4;
+constexpr double kGrowthToRepeat = 4;
 // Ratio of the misfits from which on the second mixture is the better one.
 constexpr double kBetter = 0.8;
 // Where the rows that are propagated again are limited, a search may take this part of them.
@@ -35,8 +35,9 @@ bool SecondSearch::IsDue(const Problem& problem, double misfit) const {
   if (!problem.expansion.adaptive || misfit < kMinMisfit) return false;
   const std::optional<int64_t>& limit = problem.expansion.max_replay_row_count;
   if (limit && state_.row > *limit / kSearchesInLimit) return false;
-  return static_cast<double>(state_.row) >= kPatience * static_cast<double>(state_.tried_row) ||
-         misfit >= kPatience * state_.tried_misfit;
+  return static_cast<double>(state_.row) >=
+             kGrowthToRepeat * static_cast<double>(state_.tried_row) ||
+         misfit >= kGrowthToRepeat * state_.tried_misfit;
 }
 
 absl::Status SecondSearch::Look(const ResolvedProblem& problem, const SampleStore* store,

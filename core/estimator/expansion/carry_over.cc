@@ -96,8 +96,8 @@ absl::StatusOr<Inherited> Judge(const ResolvedProblem& problem, const RegionalEx
                                 const Stop& stop, double max_shift) {
   POLYEST_RETURN_IF_ERROR(Refusal(problem, present, kept, design));
   Inherited inherited{.error = ErrorIn(design, present, kept.absorbed)};
-  const double most = max_shift * max_shift * present.noise().misfit;
-  if (!(inherited.error <= most)) return Refused("the sums are not accurate enough");
+  const double max_error = max_shift * max_shift * present.noise().misfit;
+  if (!(inherited.error <= max_error)) return Refused("the sums are not accurate enough");
   if (!kept.ensemble) return inherited;
   if (rows - kept.absorbed.rows < RowsToJudge(problem)) {
     return Refused("too few rows tell how accurate the states are");
@@ -108,7 +108,7 @@ absl::StatusOr<Inherited> Judge(const ResolvedProblem& problem, const RegionalEx
   inherited.rate =
       kept.absorbed.carried_rate + pairs.mean_square * GrowthIn(design, present.design());
   const double to_come = kRoomToGrow * static_cast<double>(present.absorbed().samples);
-  if (!(inherited.error + inherited.rate * to_come <= most)) {
+  if (!(inherited.error + inherited.rate * to_come <= max_error)) {
     return Refused("the states are not accurate enough");
   }
   return inherited;

@@ -38,7 +38,7 @@ constexpr int kMaxSearches = 4, kStartsOfSearch = 24;
 constexpr Eigen::Index kBestOfSearch = 1024;
 // They are also searched from where the first so many of them let others be expected, unless one is
 // within this fraction of the box's width there.
-constexpr size_t kMostOfCorners = 24;
+constexpr size_t kMaxMinimaOfCorners = 24;
 constexpr double kNearMinimum = 0.01;
 // Several Gaussians have so many points for each of a single one, and may be adapted so often.
 constexpr int kPointsOfModes = 4, kAdaptations = 5;
@@ -47,7 +47,7 @@ constexpr int kPointsOfModes = 4, kAdaptations = 5;
 constexpr double kLeastRough = 500, kHeaviestRough = 0.03;
 // Most of the guesses that may lie out of their reach, in the tails of a mode, before they are
 // adapted and when they are used.
-constexpr double kMostBeyondAtFirst = 0.1, kMostBeyond = 0.01;
+constexpr double kMaxBeyondAtFirst = 0.1, kMaxBeyond = 0.01;
 
 // Returns the indices of the finite costs, lowest first, `most` of them at most.
 std::vector<Eigen::Index> Lowest(const Vector& costs, Eigen::Index most) {
@@ -207,7 +207,7 @@ class GuardedImportance {
   // Returns the best of the points η_i + η_j − η_k for the minima η: the fourth corners of
   // parallelograms of which three are known. At most as many as a search has starts.
   Matrix Corners() const {
-    const size_t count = std::min<size_t>(CountOfMinima(), kMostOfCorners);
+    const size_t count = std::min<size_t>(CountOfMinima(), kMaxMinimaOfCorners);
     std::vector<Vector> found;
     for (size_t k = 0; k < count; ++k) {
       for (size_t i = 0; i < count; ++i) {
@@ -253,7 +253,7 @@ class GuardedImportance {
       if (FindsOthers(starts)) modes = Modes();
       if (!modes) return std::nullopt;
     }
-    if (!Reach(*modes, kMostBeyondAtFirst)) return std::nullopt;
+    if (!Reach(*modes, kMaxBeyondAtFirst)) return std::nullopt;
     modes->push_back(AroundAll(*modes));
     return modes;
   }
@@ -288,7 +288,7 @@ class GuardedImportance {
           ImportanceSample(cost_, lower_, upper_, *modes, kPointsOfModes * points);
       if (!(drawn.effective_size > 0)) return;
       const std::vector<GaussianMode> used = *std::exchange(modes, AdaptedTo(drawn, *modes));
-      if (!Reach({used.begin(), used.end() - 1}, kMostBeyond)) continue;
+      if (!Reach({used.begin(), used.end() - 1}, kMaxBeyond)) continue;
       if (IsReliable(drawn, points)) {
         result_.draws = std::move(drawn);
         result_.rough.reset();

@@ -100,7 +100,7 @@ Matrix LowestAndOutside(const RegionalExpansion& expansion, const Cost& cost,
 absl::StatusOr<std::unique_ptr<RegionalExpansion>> RunModel(const RegionalExpansion& present,
                                                             const Matrix& etas,
                                                             const Vector& inside,
-                                                            const SettleRequest& request,
+                                                            const SettlementRequest& request,
                                                             const Stop& stop) {
   Truncation truncation =
       FirstTruncation(request.problem->problem().expansion, present.design().region.dimension());
@@ -118,7 +118,7 @@ absl::StatusOr<std::unique_ptr<RegionalExpansion>> RunModel(const RegionalExpans
 // run there. Over a long record an expansion that is accurate in all of its region stands for it.
 absl::StatusOr<std::vector<double>> CostsAt(const RegionalExpansion& expansion, const Cost& cost,
                                             const Matrix& etas, const Matrix& particles,
-                                            const SettleRequest& request, const Stop& stop,
+                                            const SettlementRequest& request, const Stop& stop,
                                             ConfirmedMinima& confirmed) {
   std::vector<double> costs(static_cast<size_t>(etas.rows()), kInfinity);
   if (request.rows > RowsOfShortRecord(*request.problem) &&
@@ -148,7 +148,8 @@ absl::StatusOr<std::vector<double>> CostsAt(const RegionalExpansion& expansion, 
 
 absl::StatusOr<ConfirmedMinima> OverlookedMinima(const RegionalExpansion& expansion,
                                                  const Cost& cost, const Matrix& particles,
-                                                 const SettleRequest& request, const Stop& stop) {
+                                                 const SettlementRequest& request,
+                                                 const Stop& stop) {
   ConfirmedMinima confirmed{.points = Matrix(0, cost.dimension())};
   const Matrix etas = LowestAndOutside(expansion, cost, particles, request.guesses, stop);
   POLYEST_RETURN_IF_ERROR(stop.Check());

@@ -25,7 +25,8 @@ struct ConfirmedMinima {
 // error on a stop request or when the store cannot be read.
 absl::StatusOr<ConfirmedMinima> OverlookedMinima(const RegionalExpansion& expansion,
                                                  const Cost& cost, const Matrix& particles,
-                                                 const SettleRequest& request, const Stop& stop);
+                                                 const SettlementRequest& request,
+                                                 const Stop& stop);
 
 // Returns points (count × n, germ coordinates) of the normal distribution around a minimum (local
 // coordinates) that the curvature of the cost there means; the minimum itself where the cost is not

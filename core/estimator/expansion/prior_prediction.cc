@@ -12,7 +12,7 @@ namespace polyest::internal {
 namespace {
 
 constexpr int64_t kRows = 16;
-constexpr std::chrono::seconds kPatience{1};
+constexpr std::chrono::seconds kMaxDuration{1};
 
 // Returns the first rows, as far as the beginning, which is what the store has, settles the
 // streamed inputs.
@@ -42,7 +42,7 @@ void AddPredictionsOfPrior(const ResolvedProblem& problem, RecordSummary& record
   if (block.count() == 0) return;
   auto design = DesignForPrior(problem);
   if (!design.ok()) return;
-  const Stop stop(std::stop_token(), Stop::Clock::now() + kPatience);
+  const Stop stop(std::stop_token(), Stop::Clock::now() + kMaxDuration);
   auto expansion = RegionalExpansion::Make(problem, &store, *std::move(design),
                                            NoiseToBeginWith(problem.problem()), 1, stop);
   if (!expansion.ok()) return;

@@ -41,7 +41,7 @@ constexpr double kWidenedShift = 0.1 * kNegligibleShift;
 // Carries out one settlement; holds the state that changes between attempts.
 class Settler {
  public:
-  Settler(const RegionalExpansion& present, const SettleRequest& request, const Stop& stop)
+  Settler(const RegionalExpansion& present, const SettlementRequest& request, const Stop& stop)
       : present_(present), request_(request), stop_(stop) {}
 
   absl::StatusOr<Settlement> Run() {
@@ -295,8 +295,8 @@ class Settler {
   // Whether the allowance forbids to propagate the record from its beginning.
   bool Withheld() const { return !result_.allowance.AllowsRecord(request_.rows); }
 
-  SettleRequest RequestNow() const {
-    SettleRequest request = request_;
+  SettlementRequest RequestNow() const {
+    SettlementRequest request = request_;
     request.allowance = result_.allowance;
     return request;
   }
@@ -364,7 +364,7 @@ class Settler {
   }
 
   const RegionalExpansion& present_;
-  const SettleRequest& request_;
+  const SettlementRequest& request_;
   const Stop& stop_;
   double power_ = 1;  // of the likelihood from which the particles were drawn
   bool has_widened_ = false;
@@ -374,18 +374,18 @@ class Settler {
 
 }  // namespace
 
-absl::StatusOr<Settlement> Settle(const RegionalExpansion& present, const SettleRequest& request,
-                                  const Stop& stop) {
+absl::StatusOr<Settlement> MakeSettlement(const RegionalExpansion& present,
+                                          const SettlementRequest& request, const Stop& stop) {
   return Settler(present, request, stop).Run();
 }
 
-absl::StatusOr<Settlement> SettleFurther(const RegionalExpansion& present, Settlement begun,
-                                         SettleRequest request, const Stop& stop) {
+absl::StatusOr<Settlement> ContinueSettlement(const RegionalExpansion& present, Settlement begun,
+                                              SettlementRequest request, const Stop& stop) {
   request.guesses = std::move(begun.particles);
   request.memory = std::move(begun.memory);
   request.allowance = begun.allowance;
   const RegionalExpansion& reached = begun.expansion ? *begun.expansion : present;
-  POLYEST_ASSIGN_OR_RETURN(Settlement settlement, Settle(reached, request, stop));
+  POLYEST_ASSIGN_OR_RETURN(Settlement settlement, MakeSettlement(reached, request, stop));
   settlement.reexpansions += begun.reexpansions;
   settlement.propagated_rows += begun.propagated_rows;
   if (!begun.expansion) return settlement;

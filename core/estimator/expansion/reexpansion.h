@@ -31,7 +31,7 @@
 
 namespace polyest::internal {
 
-struct SettleRequest {
+struct SettlementRequest {
   const ResolvedProblem* problem = nullptr;
   const SampleStore* store = nullptr;
   int64_t rows = 0;         // rows of the store that the expansion has absorbed
@@ -62,13 +62,13 @@ struct Settlement {
 
 // Carries out a settlement. Returns an error on a stop request or when the store cannot be read;
 // `present` is then unchanged and the call may be repeated.
-absl::StatusOr<Settlement> Settle(const RegionalExpansion& present, const SettleRequest& request,
-                                  const Stop& stop);
+absl::StatusOr<Settlement> MakeSettlement(const RegionalExpansion& present,
+                                          const SettlementRequest& request, const Stop& stop);
 
 // Goes on with a settlement of `present` that has ended at overlooked minima; `request` says how
-// and with which seed. Returns what both have found together, or an error as Settle does.
-absl::StatusOr<Settlement> SettleFurther(const RegionalExpansion& present, Settlement begun,
-                                         SettleRequest request, const Stop& stop);
+// and with which seed. Returns what both have found together, or an error as MakeSettlement does.
+absl::StatusOr<Settlement> ContinueSettlement(const RegionalExpansion& present, Settlement begun,
+                                              SettlementRequest request, const Stop& stop);
 
 // Makes an expansion of the design and lets it absorb the first `rows` rows of the store, from
 // problem.first_row() on. Returns FailedPrecondition when its collocation matrix cannot be factored

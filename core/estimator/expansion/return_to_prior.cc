@@ -44,7 +44,7 @@ bool HasReturnedToPrior(const ResolvedProblem& problem, const ExpansionDesign& d
   return design.whole_prior && design.basis->order() > first.order;
 }
 
-bool MayReturnToPrior(const RegionalExpansion& present, const SettleRequest& request) {
+bool MayReturnToPrior(const RegionalExpansion& present, const SettlementRequest& request) {
   const ResolvedProblem& problem = *request.problem;
   if (problem.dimension() <= kFewDimensions || problem.problem().expansion.order) return false;
   if (!request.may_raise_order || !request.may_replay) return false;
@@ -57,7 +57,7 @@ bool MayReturnToPrior(const RegionalExpansion& present, const SettleRequest& req
 }
 
 absl::StatusOr<PriorReturn> ReturnToPrior(const RegionalExpansion& present,
-                                          const SettleRequest& request, const Matrix& particles,
+                                          const SettlementRequest& request, const Matrix& particles,
                                           const Vector& costs, ReplayAllowance& allowance,
                                           const Stop& stop) {
   const ResolvedProblem& problem = *request.problem;

@@ -39,7 +39,7 @@ bool HasReturnedToPrior(const ResolvedProblem& problem, const ExpansionDesign& d
 
 // Whether the expansion is too inaccurate at its check points and may return to the prior, or, over
 // the prior already, may be made again with check points where the posterior is now.
-bool MayReturnToPrior(const RegionalExpansion& present, const SettleRequest& request);
+bool MayReturnToPrior(const RegionalExpansion& present, const SettlementRequest& request);
 
 struct PriorReturn {
   std::unique_ptr<RegionalExpansion> expansion;  // null if none is clearly better
@@ -51,7 +51,7 @@ struct PriorReturn {
 // the allowance up by the record. Returns an error on a stop request or when the store cannot be
 // read.
 absl::StatusOr<PriorReturn> ReturnToPrior(const RegionalExpansion& present,
-                                          const SettleRequest& request, const Matrix& particles,
+                                          const SettlementRequest& request, const Matrix& particles,
                                           const Vector& costs, ReplayAllowance& allowance,
                                           const Stop& stop);
 

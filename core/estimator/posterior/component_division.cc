@@ -38,7 +38,7 @@ PosteriorSummary SummaryOf(const Matrix& particles) {
 
 }  // namespace
 
-int MostComponents(const ResolvedProblem& problem) {
+int MaxComponents(const ResolvedProblem& problem) {
   const ExpansionOptions& options = problem.problem().expansion;
   const int n = problem.dimension();
   const auto terms = TermCount(n, FirstTruncation(options, n), kMaxTerms);
@@ -104,7 +104,7 @@ absl::Status MixtureComponent::Halve(const Stop& stop) {
 // posterior contracts as far as the collocation points confirm it, the expansion moves there. That
 // costs far less than elements, but leaves separate modes where they are.
 absl::StatusOr<bool> MixtureComponent::ContractOrBisect(const Stop& stop) {
-  POLYEST_ASSIGN_OR_RETURN(const bool moved, Settle(stop, /*may_raise_order=*/false));
+  POLYEST_ASSIGN_OR_RETURN(const bool moved, MoveToPosterior(stop, /*may_raise_order=*/false));
   return moved || BisectElement();
 }
 
@@ -206,7 +206,7 @@ absl::Status MixtureComponent::BeginOn(const MixtureComponent& parent, const Pie
   POLYEST_RETURN_IF_ERROR(ExpandOn(parent, piece, stop));
   bool moved = !parent.halves_;
   for (int i = 0; moved && !must_divide() && i < kMaxSettlementsAtRow; ++i) {
-    POLYEST_ASSIGN_OR_RETURN(moved, Settle(stop, /*may_raise_order=*/true));
+    POLYEST_ASSIGN_OR_RETURN(moved, MoveToPosterior(stop, /*may_raise_order=*/true));
   }
   return absl::OkStatus();
 }

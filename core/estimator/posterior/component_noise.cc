@@ -24,11 +24,11 @@ constexpr double kResidualToNoise = 0.1;
 // accumulate to a noticeable share of the posterior's standard deviation. The error is the same at
 // every sample's parameters while the noise averages out, so N samples together see errors smaller
 // than one sample does by √N: relative tolerance ≤ kTolerancePerNoise × noise ÷ signal ÷ √N,
-// counting no fewer than kFewestSamples. The tolerance is checked where windows end, and never goes
-// below what double precision supports.
+// counting no fewer than kMinSamplesCounted. The tolerance is checked where windows end, and never
+// goes below what double precision supports.
 constexpr double kTolerancePerNoise = 1e-4;
-constexpr double kFewestSamples = 100;
-constexpr double kTightestTolerance = 1e-12;
+constexpr double kMinSamplesCounted = 100;
+constexpr double kMinTolerance = 1e-12;
 // Where control trajectories show that the estimate may be off by more standard deviations than the
 // first, the tolerance is set so that it is off by the second: errors of integration are
 // proportional to the tolerance. An error of the phase moves the estimate by N^2.5, which a window
@@ -66,7 +66,7 @@ bool MixtureComponent::ReviseMisfit(const Stop& stop) {
 }
 
 // Returns true when the expansion has moved. After a stop it goes on where it was left.
-absl::StatusOr<bool> MixtureComponent::SettleWithMisfit(const Stop& stop) {
+absl::StatusOr<bool> MixtureComponent::MoveWithMisfit(const Stop& stop) {
   for (; row_end_.revisions <= kMaxMisfitRevisions && !must_divide(); ++row_end_.revisions) {
     if (!row_end_.goes_on) {
       const bool goes_on = ReviseMisfit(stop);
@@ -76,7 +76,7 @@ absl::StatusOr<bool> MixtureComponent::SettleWithMisfit(const Stop& stop) {
     if (row_end_.revisions > 0 && !*row_end_.goes_on) break;
     POLYEST_ASSIGN_OR_RETURN(const bool tightened, TightenTolerance(stop));
     row_end_.moved = row_end_.moved || tightened;
-    POLYEST_ASSIGN_OR_RETURN(const bool settled, SettleIfInaccurate(stop));
+    POLYEST_ASSIGN_OR_RETURN(const bool settled, RestoreAccuracy(stop));
     row_end_.moved = row_end_.moved || settled;
     row_end_.goes_on.reset();
     row_end_.revised_from.reset();
@@ -90,7 +90,7 @@ absl::Status MixtureComponent::WithdrawTempering(const Stop& stop) {
   while (tempered_.misfit > 1 && taken_ >= tempered_.rows && !must_divide()) {
     const TemperedBeginning before = tempered_;
     tempered_.misfit = std::max(1.0, before.misfit / kMisfitStep);
-    const absl::Status settled = SettleWithMisfit(stop).status();
+    const absl::Status settled = MoveWithMisfit(stop).status();
     if (settled.ok()) continue;
     tempered_ = before;
     return settled;
@@ -143,7 +143,7 @@ absl::StatusOr<bool> MixtureComponent::LearnNoise(const Stop& stop) {
     POLYEST_RETURN_IF_ERROR(RenewEndedRuns(stop));
     if (adaptive()) {
       POLYEST_RETURN_IF_ERROR(TightenTolerance(stop).status());
-      POLYEST_RETURN_IF_ERROR(SettleIfInaccurate(stop).status());
+      POLYEST_RETURN_IF_ERROR(RestoreAccuracy(stop).status());
     }
     row_end_.settles = false;
   }
@@ -225,7 +225,7 @@ double MixtureComponent::ToleranceForControls(double shift) const {
 // the expansion has been made again.
 absl::StatusOr<bool> MixtureComponent::TightenTolerance(const Stop& stop) {
   if (!problem_.problem().tolerance_follows_noise) return false;
-  const double samples = std::max(kFewestSamples, static_cast<double>(summary_.samples()));
+  const double samples = std::max(kMinSamplesCounted, static_cast<double>(summary_.samples()));
   const double needed =
       kTolerancePerNoise * summary_.NoiseToSignal(expansion_->noise()) / std::sqrt(samples);
   const double present = problem_.problem().integration.relative_tolerance;
@@ -234,7 +234,7 @@ absl::StatusOr<bool> MixtureComponent::TightenTolerance(const Stop& stop) {
   // replays: four times as many samples come before the next.
   if (needed < present) tolerance = 0.5 * needed;
   const double shift = ShiftOfControls();
-  tolerance = std::max(kTightestTolerance, std::min(tolerance, ToleranceForControls(shift)));
+  tolerance = std::max(kMinTolerance, std::min(tolerance, ToleranceForControls(shift)));
   if (tolerance >= present || expansion_->StepsExactly()) {
     postponed_.tolerance = 0;
     return false;

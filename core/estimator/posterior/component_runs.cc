@@ -123,12 +123,11 @@ std::optional<GermSummary> MixtureComponent::GaussianPosterior(const Stop& stop)
 // Returns particles of the present posterior, germ coordinates. Leaves the component as it is, so
 // that a stop has no effect on later results.
 absl::StatusOr<Matrix> MixtureComponent::ParticlesNow(const Stop& stop) const {
-  SettleRequest request = RequestSettlement();
+  SettlementRequest request = RequestSettlement();
   request.may_raise_order = false;
   request.memory = {};  // the particles are drawn anew
   request.allowance = ReplayAllowance();
-  POLYEST_ASSIGN_OR_RETURN(Settlement settlement,
-                           polyest::internal::Settle(*expansion_, request, stop));
+  POLYEST_ASSIGN_OR_RETURN(Settlement settlement, MakeSettlement(*expansion_, request, stop));
   if (settlement.particles.rows() <= problem_.dimension()) {
     return absl::FailedPreconditionError("the posterior of a run that has ended was not found");
   }

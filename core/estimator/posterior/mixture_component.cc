@@ -24,7 +24,7 @@ constexpr double kMaxShift = 0.08;
 constexpr double kWindowGrowth = 1.3;
 // After a settlement that did not help, further rows are taken with their discount before the next
 // attempt: the record since the windows' beginning, divided by this number.
-constexpr int64_t kPatience = 8;
+constexpr int64_t kAttemptsPerRecord = 8;
 // The region's edges are looked at again after the record since the windows' beginning, divided by
 // this number.
 constexpr int64_t kLooksPerRecord = 20;
@@ -67,7 +67,7 @@ absl::StatusOr<std::unique_ptr<MixtureComponent>> MixtureComponent::OfPrior(
   POLYEST_ASSIGN_OR_RETURN(component->expansion_,
                            RegionalExpansion::Make(component->problem_, store, std::move(design),
                                                    noise.ForNewExpansion(), threads, stop));
-  component->room_ = MostComponents(problem);
+  component->room_ = MaxComponents(problem);
   return component;
 }
 
@@ -157,7 +157,7 @@ absl::StatusOr<bool> MixtureComponent::AbsorbBlock(const RowBlock& block, const 
     const bool coarse = !short_of_trajectories && taken_ >= patient_until_ &&
                         expansion_->ResidualToNoise(row) > CoarseResidual();
     if (short_of_trajectories || (adaptive() && coarse)) {
-      POLYEST_ASSIGN_OR_RETURN(const bool moved, SettleBefore(row, stop));
+      POLYEST_ASSIGN_OR_RETURN(const bool moved, RefineBefore(row, stop));
       if (moved) return false;
       too_coarse = !short_of_trajectories && MayBisect();
     }
@@ -183,25 +183,25 @@ absl::StatusOr<bool> MixtureComponent::FinishRow(const Stop& stop) {
   if (must_divide()) return true;
   bool settled = false;
   if (WindowEnds()) {
-    POLYEST_ASSIGN_OR_RETURN(settled, SettleAfterWindow(stop));
+    POLYEST_ASSIGN_OR_RETURN(settled, EndWindow(stop));
   } else if (LooksAtEdges()) {
-    POLYEST_ASSIGN_OR_RETURN(settled, SettleIfLeaning(stop));
+    POLYEST_ASSIGN_OR_RETURN(settled, MoveIfLeaning(stop));
   } else if (LooksAhead()) {
-    POLYEST_ASSIGN_OR_RETURN(settled, SettleAhead(stop));
+    POLYEST_ASSIGN_OR_RETURN(settled, MoveAheadOfNeed(stop));
   }
   ahead_row_ = std::max(ahead_row_, taken_ + 1);  // a row is looked at once, in one of these ways
   return moved || settled;
 }
 
 // Handles a next row at which the present expansion is too coarse or too few trajectories are left.
-absl::StatusOr<bool> MixtureComponent::SettleBefore(int row, const Stop& stop) {
+absl::StatusOr<bool> MixtureComponent::RefineBefore(int row, const Stop& stop) {
   const bool short_of_trajectories = row == expansion_->fitted_rows();
   if (settled_row_ != taken_) settlements_at_row_ = 0;
   settled_row_ = taken_;
   // There is no expansion to stay with.
   if (short_of_trajectories) allowance_.ExemptAt(taken_);
   if (adaptive() && taken_ > 0 && settlements_at_row_ < kMaxSettlementsAtRow) {
-    POLYEST_ASSIGN_OR_RETURN(const bool moved, Settle(stop, !short_of_trajectories));
+    POLYEST_ASSIGN_OR_RETURN(const bool moved, MoveToPosterior(stop, !short_of_trajectories));
     ++settlements_at_row_;
     if (moved) return true;
   }
@@ -213,17 +213,17 @@ absl::StatusOr<bool> MixtureComponent::SettleBefore(int row, const Stop& stop) {
     return expansion_->shortage();
   }
   if (MayBisect()) return false;
-  patient_until_ = taken_ + 1 + (taken_ - windows_from_) / kPatience;
+  patient_until_ = taken_ + 1 + (taken_ - windows_from_) / kAttemptsPerRecord;
   return false;
 }
 
-absl::StatusOr<bool> MixtureComponent::SettleAfterWindow(const Stop& stop) {
+absl::StatusOr<bool> MixtureComponent::EndWindow(const Stop& stop) {
   if (learns_noise_ && !row_end_.learned) {
     POLYEST_ASSIGN_OR_RETURN(row_end_.learned, LearnNoise(stop));
   }
   bool moved = row_end_.learned.value_or(false);
   if (adaptive()) {
-    POLYEST_ASSIGN_OR_RETURN(const bool settled, SettleWithMisfit(stop));
+    POLYEST_ASSIGN_OR_RETURN(const bool settled, MoveWithMisfit(stop));
     moved = moved || settled;
   }
   row_end_ = {};  // where nothing was settled
@@ -244,10 +244,10 @@ bool MixtureComponent::Leans() const {
 }
 
 // Within a window the posterior may wander to an edge of the region, where it would be cut.
-absl::StatusOr<bool> MixtureComponent::SettleIfLeaning(const Stop& stop) {
+absl::StatusOr<bool> MixtureComponent::MoveIfLeaning(const Stop& stop) {
   bool settled = false;
   if (Leans()) {
-    POLYEST_ASSIGN_OR_RETURN(settled, Settle(stop, /*may_raise_order=*/false));
+    POLYEST_ASSIGN_OR_RETURN(settled, MoveToPosterior(stop, /*may_raise_order=*/false));
   }
   edges_row_ = NextLook();
   return settled;
@@ -263,7 +263,7 @@ bool MixtureComponent::LooksAhead() const {
   return taken_ - expansion_->kept_state()->absorbed.rows == std::max<int64_t>(1, interval / 2);
 }
 
-absl::StatusOr<bool> MixtureComponent::SettleAhead(const Stop& stop) {
+absl::StatusOr<bool> MixtureComponent::MoveAheadOfNeed(const Stop& stop) {
   const Cost cost = expansion_->MakeCost(problem_.problem().regularization);
   const double shift = LargestShift(*expansion_, cost.power());
   const bool is_short = taken_ <= RowsOfShortRecord(problem_);
@@ -272,19 +272,19 @@ absl::StatusOr<bool> MixtureComponent::SettleAhead(const Stop& stop) {
     ahead_row_ = taken_ + 1;
     return false;
   }
-  POLYEST_ASSIGN_OR_RETURN(const bool settled,
-                           Settle(stop, /*may_raise_order=*/false, /*may_replay=*/is_short));
+  POLYEST_ASSIGN_OR_RETURN(const bool settled, MoveToPosterior(stop, /*may_raise_order=*/false,
+                                                               /*may_replay=*/is_short));
   ahead_row_ = settled ? taken_ + 1 : taken_ + taken_ / kLooksAhead;
   return settled;
 }
 
-absl::StatusOr<bool> MixtureComponent::SettleIfInaccurate(const Stop& stop) {
-  POLYEST_ASSIGN_OR_RETURN(const bool moved, SettleWhileInaccurate(stop));
+absl::StatusOr<bool> MixtureComponent::RestoreAccuracy(const Stop& stop) {
+  POLYEST_ASSIGN_OR_RETURN(const bool moved, MoveWhileInaccurate(stop));
   row_end_.settlements = 0;
   return moved;
 }
 
-absl::StatusOr<bool> MixtureComponent::SettleWhileInaccurate(const Stop& stop) {
+absl::StatusOr<bool> MixtureComponent::MoveWhileInaccurate(const Stop& stop) {
   const auto shift = [&] {
     const Cost cost = expansion_->MakeCost(problem_.problem().regularization);
     return BelievedShift(*expansion_, cost, bisected_);
@@ -298,7 +298,8 @@ absl::StatusOr<bool> MixtureComponent::SettleWhileInaccurate(const Stop& stop) {
       postponed_.expansion = 0;
       return row_end_.settlements > 0;
     }
-    POLYEST_ASSIGN_OR_RETURN(const bool settled, Settle(stop, /*may_raise_order=*/!follows));
+    POLYEST_ASSIGN_OR_RETURN(const bool settled,
+                             MoveToPosterior(stop, /*may_raise_order=*/!follows));
     if (must_divide()) return true;
     if (!settled) break;
   }
@@ -309,8 +310,8 @@ absl::StatusOr<bool> MixtureComponent::SettleWhileInaccurate(const Stop& stop) {
   return (!waits && shift() > kMinShiftToBisect && BisectElement()) || moved;
 }
 
-SettleRequest MixtureComponent::RequestSettlement() const {
-  SettleRequest request;
+SettlementRequest MixtureComponent::RequestSettlement() const {
+  SettlementRequest request;
   request.problem = &problem_;
   request.store = store_;
   request.rows = taken_;
@@ -326,21 +327,20 @@ SettleRequest MixtureComponent::RequestSettlement() const {
 // minima, the pieces around them are told apart on the expansion that shows them; only if that is
 // not possible does it move to where all of them are. A stop changes nothing, so that what is due
 // is found to be due again.
-absl::StatusOr<bool> MixtureComponent::Settle(const Stop& stop, bool may_raise_order,
-                                              bool may_replay) {
-  SettleRequest request = RequestSettlement();
+absl::StatusOr<bool> MixtureComponent::MoveToPosterior(const Stop& stop, bool may_raise_order,
+                                                       bool may_replay) {
+  SettlementRequest request = RequestSettlement();
   request.may_replay = may_replay;
   request.may_raise_order = may_raise_order && !bisected_;
   request.ends_at_overlooked = MayLookForPieces();
-  POLYEST_ASSIGN_OR_RETURN(Settlement settlement,
-                           polyest::internal::Settle(*expansion_, request, stop));
+  POLYEST_ASSIGN_OR_RETURN(Settlement settlement, MakeSettlement(*expansion_, request, stop));
   if (!settlement.overlooked || !request.ends_at_overlooked) return Take(std::move(settlement));
   const RegionalExpansion& shown = settlement.expansion ? *settlement.expansion : *expansion_;
   if (!DivideIntoPieces(shown, settlement.particles)) {
     request.ends_at_overlooked = false;
     request.seed = SeedOfSettlement(settlements_ + 1);
-    POLYEST_ASSIGN_OR_RETURN(
-        settlement, SettleFurther(*expansion_, std::move(settlement), std::move(request), stop));
+    POLYEST_ASSIGN_OR_RETURN(settlement, ContinueSettlement(*expansion_, std::move(settlement),
+                                                            std::move(request), stop));
     ++settlements_;
   }
   return Take(std::move(settlement)) || must_divide();
@@ -366,10 +366,9 @@ absl::Status MixtureComponent::MakeComparable(const Stop& stop) {
   POLYEST_RETURN_IF_ERROR(Recover(stop));
   const Cost cost = expansion_->MakeCost(problem_.problem().regularization);
   if (!AgreementWithModel(*expansion_, cost).mean_difference) {
-    SettleRequest request = RequestSettlement();
+    SettlementRequest request = RequestSettlement();
     request.may_raise_order = false;
-    POLYEST_ASSIGN_OR_RETURN(Settlement settlement,
-                             polyest::internal::Settle(*expansion_, request, stop));
+    POLYEST_ASSIGN_OR_RETURN(Settlement settlement, MakeSettlement(*expansion_, request, stop));
     Take(std::move(settlement));
   }
   comparable_row_ = taken_;

@@ -29,7 +29,7 @@ int64_t NextWindow(int64_t rows, int64_t from = 0);
 // Returns the maximum number of components of the problem's posterior. The budget is the number of
 // trajectories that they propagate together, so that it does not depend on their order or
 // dimension.
-int MostComponents(const ResolvedProblem& problem);
+int MaxComponents(const ResolvedProblem& problem);
 
 struct ComponentState;
 
@@ -131,12 +131,12 @@ class MixtureComponent {
   absl::Status RenewEndedRuns(const Stop& stop);
   absl::StatusOr<bool> AbsorbBlock(const RowBlock& block, const Stop& stop);
   absl::StatusOr<bool> FinishRow(const Stop& stop);
-  absl::StatusOr<bool> SettleBefore(int row, const Stop& stop);
-  absl::StatusOr<bool> SettleAfterWindow(const Stop& stop);
+  absl::StatusOr<bool> RefineBefore(int row, const Stop& stop);
+  absl::StatusOr<bool> EndWindow(const Stop& stop);
   absl::Status WithdrawTempering(const Stop& stop);
-  absl::StatusOr<bool> SettleWithMisfit(const Stop& stop);
-  absl::StatusOr<bool> SettleIfInaccurate(const Stop& stop);
-  absl::StatusOr<bool> SettleWhileInaccurate(const Stop& stop);
+  absl::StatusOr<bool> MoveWithMisfit(const Stop& stop);
+  absl::StatusOr<bool> RestoreAccuracy(const Stop& stop);
+  absl::StatusOr<bool> MoveWhileInaccurate(const Stop& stop);
   absl::StatusOr<bool> RaiseUnlearnedScales(const RowBlock& block, int row, const Stop& stop);
   absl::StatusOr<bool> LearnNoise(const Stop& stop);
   double ShiftOfControls() const;
@@ -148,8 +148,9 @@ class MixtureComponent {
   absl::StatusOr<std::unique_ptr<RegionalExpansion>> ReplayedWith(const LearnedNoise& noise,
                                                                   const Stop& stop);
   absl::StatusOr<bool> TightenTolerance(const Stop& stop);
-  absl::StatusOr<bool> Settle(const Stop& stop, bool may_raise_order, bool may_replay = true);
-  SettleRequest RequestSettlement() const;
+  absl::StatusOr<bool> MoveToPosterior(const Stop& stop, bool may_raise_order,
+                                       bool may_replay = true);
+  SettlementRequest RequestSettlement() const;
   bool Take(Settlement settlement);
   // The progress of what is due after the last row taken. It outlives a stop, so that the work goes
   // on where it was left: a settlement made once more would change the estimate.
@@ -160,15 +161,15 @@ class MixtureComponent {
     int revisions = 0;                   // of the misfit
     std::optional<double> revised_from;  // misfit before the present one
     std::optional<bool> goes_on;         // what ReviseMisfit has returned
-    int settlements = 0;                 // of SettleIfInaccurate that have moved the expansion
-    bool moved = false;                  // whether SettleWithMisfit has moved the expansion
+    int settlements = 0;                 // of RestoreAccuracy that have moved the expansion
+    bool moved = false;                  // whether MoveWithMisfit has moved the expansion
   };
   double CoarseResidual() const;
   bool ReviseMisfit(const Stop& stop);
   int64_t NextLook() const;
   bool Leans() const;
-  absl::StatusOr<bool> SettleIfLeaning(const Stop& stop);
-  absl::StatusOr<bool> SettleAhead(const Stop& stop);
+  absl::StatusOr<bool> MoveIfLeaning(const Stop& stop);
+  absl::StatusOr<bool> MoveAheadOfNeed(const Stop& stop);
   bool MayLookForPieces() const;
   bool DivideIntoPieces(const RegionalExpansion& expansion, const Matrix& particles);
   bool LookForPieces();

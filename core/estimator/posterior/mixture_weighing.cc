@@ -8,7 +8,7 @@
 
 #include "core/bayes/weighted_samples.h"
 #include "core/common/status.h"
-#include "core/estimator/posterior/most_evidence.h"
+#include "core/estimator/posterior/max_log_evidence.h"
 
 namespace polyest::internal {
 namespace {
@@ -29,9 +29,9 @@ struct Weighed {
 
 class Weighing {
  public:
-  Weighing(const std::vector<AssessmentRequest>& requests, size_t most)
+  Weighing(const std::vector<AssessmentRequest>& requests, size_t max_kept)
       : requests_(requests),
-        most_(most),
+        max_kept_(max_kept),
         power_(CommonPower(requests)),
         weighed_(requests.size()) {}
 
@@ -42,9 +42,9 @@ class Weighing {
     for (const Weighed& one : weighed_) evidences.push_back(one.log_evidence);
     const std::vector<double> weights = WeightsOf(evidences);
     std::vector<size_t> order = HeaviestFirst(weights);
-    if (order.size() > most_) {
-      weighing.left_out = weights[order[most_]];
-      order.resize(most_);
+    if (order.size() > max_kept_) {
+      weighing.left_out = weights[order[max_kept_]];
+      order.resize(max_kept_);
     }
     std::ranges::sort(order);
     for (const size_t k : order) {
@@ -71,20 +71,20 @@ class Weighing {
   // Draws from the components in the order of the most that their evidence can be, until the rest
   // can no longer matter.
   absl::Status WeighHeaviest(const Stop& stop) {
-    std::vector<double> most;
+    std::vector<double> bounds;
     for (const AssessmentRequest& request : requests_) {
       POLYEST_RETURN_IF_ERROR(stop.Check());
       const Cost cost = CostOf(request);
-      most.push_back(requests_.size() > kFew
-                         ? MostEvidence(*request.expansion, cost, *request.guesses)
-                         : kInfinity);
+      bounds.push_back(requests_.size() > kFew
+                           ? MaxLogEvidence(*request.expansion, cost, *request.guesses)
+                           : kInfinity);
     }
     std::vector<size_t> order(requests_.size());
     std::iota(order.begin(), order.end(), size_t{0});
-    std::ranges::stable_sort(order, [&](size_t a, size_t b) { return most[a] > most[b]; });
+    std::ranges::stable_sort(order, [&](size_t a, size_t b) { return bounds[a] > bounds[b]; });
     double heaviest = -kInfinity;
     for (const size_t k : order) {
-      if (most[k] < heaviest + std::log(kMinWeight)) break;
+      if (bounds[k] < heaviest + std::log(kMinWeight)) break;
       POLYEST_RETURN_IF_ERROR(Weigh(k, stop));
       heaviest = std::max(heaviest, weighed_[k].log_evidence);
     }
@@ -113,7 +113,7 @@ class Weighing {
   }
 
   const std::vector<AssessmentRequest>& requests_;
-  const size_t most_;
+  const size_t max_kept_;
   const double power_;
   std::vector<Weighed> weighed_;
 };
@@ -129,8 +129,8 @@ double CommonPower(const std::vector<AssessmentRequest>& requests) {
 }
 
 absl::StatusOr<MixtureWeighing> WeighMixture(const std::vector<AssessmentRequest>& requests,
-                                             size_t most, const Stop& stop) {
-  return Weighing(requests, most).Run(stop);
+                                             size_t max_kept, const Stop& stop) {
+  return Weighing(requests, max_kept).Run(stop);
 }
 
 }  // namespace polyest::internal

@@ -21,10 +21,10 @@ struct MixtureWeighing {
   double left_out = 0;            // largest weight of those dropped for lack of room
 };
 
-// Weighs the components and keeps at most the `most` heaviest. Takes one request per component, at
-// least one, all at the same row. Returns an error only on a stop request.
+// Weighs the components and keeps at most `max_kept`, the heaviest. Takes one request per
+// component, at least one, all at the same row. Returns an error only on a stop request.
 absl::StatusOr<MixtureWeighing> WeighMixture(const std::vector<AssessmentRequest>& requests,
-                                             size_t most, const Stop& stop);
+                                             size_t max_kept, const Stop& stop);
 
 // Returns the power of the likelihood of the component that the residuals contradict least.
 double CommonPower(const std::vector<AssessmentRequest>& requests);

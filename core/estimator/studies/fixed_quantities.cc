@@ -49,8 +49,8 @@ std::vector<FixedQuantity> FixedQuantitiesOf(const ResolvedProblem& problem, dou
     if (!value) continue;
     FixedQuantity fixed{.name = quantity.name, .unit = quantity.unit, .value = *value};
     fixed.step = kFirstStep * (*value == 0 ? 1 : std::abs(*value));
-    fixed.most = kInfinity;
-    if (quantity.is_delay()) fixed.step = fixed.most = kOfInterval * interval_s;
+    fixed.max_step = kInfinity;
+    if (quantity.is_delay()) fixed.step = fixed.max_step = kOfInterval * interval_s;
     fixed.other = fixed.value + fixed.step;
     if (quantity.kind == Kind::kOutputDelay) {
       const auto channel = std::ranges::find(problem.outputs(), quantity.column);

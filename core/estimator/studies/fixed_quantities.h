@@ -15,9 +15,9 @@ struct FixedQuantity {
 
   std::string name, unit;
   double value = 0;
-  double step = 0;   // a small change, > 0
-  double most = 0;   // the largest such change, +∞ except for delays
-  double other = 0;  // the prior that it would get is between the value and this one
+  double step = 0;      // a small change, > 0
+  double max_step = 0;  // the largest such change, +∞ except for delays
+  double other = 0;     // the prior that it would get is between the value and this one
   int delayed_channel = kNoChannel;  // the measured output whose delay it is
 };
 

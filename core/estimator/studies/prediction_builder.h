@@ -16,19 +16,19 @@ namespace polyest::internal {
 // The draws that must be left at every instant.
 inline constexpr Eigen::Index kLeastDraws = 2;
 
-// Selects the rows of an answer: at most `most` of `rows`, evenly spaced.
+// Selects the rows of an answer: at most `max_count` of `rows`, evenly spaced.
 class RowSelection {
  public:
-  RowSelection(int64_t rows, int64_t most) : rows_(rows), most_(std::min(rows, most)) {}
-  int64_t size() const { return most_; }
+  RowSelection(int64_t rows, int64_t max_count) : rows_(rows), count_(std::min(rows, max_count)) {}
+  int64_t size() const { return count_; }
   // Returns the place of a row in the answer; −1 if it is left out.
   int64_t PlaceOf(int64_t row) const {
-    const int64_t place = row * most_ / rows_;
-    return row == 0 || place != (row - 1) * most_ / rows_ ? place : -1;
+    const int64_t place = row * count_ / rows_;
+    return row == 0 || place != (row - 1) * count_ / rows_ ? place : -1;
   }
 
  private:
-  int64_t rows_, most_;
+  int64_t rows_, count_;
 };
 
 class OutputPrediction;

@@ -133,8 +133,8 @@ class Neighbours {
     for (Eigen::Index i = 0; i < norms.size(); ++i) {
       const bool is_parameter = i < xi_.size();
       double& step = is_parameter ? steps_[i] : Quantity(i).step;
-      const double most = is_parameter ? kOfDeviation * Deviations()[i] : Quantity(i).most;
-      const double next = Adapted(step, norms[i], most);
+      const double max_step = is_parameter ? kOfDeviation * Deviations()[i] : Quantity(i).max_step;
+      const double next = Adapted(step, norms[i], max_step);
       changed = changed || next != step;
       step = next;
     }
@@ -146,10 +146,10 @@ class Neighbours {
   static constexpr double kOfDeviation = 0.3;
   static constexpr double kLeastFactor = 1e-6;
 
-  static double Adapted(double step, double norm, double most) {
+  static double Adapted(double step, double norm, double max_step) {
     if (!std::isfinite(norm) || (norm >= kLeastNorm && norm <= kMaxNorm)) return step;
     const double factor = std::clamp(1 / norm, kLeastFactor, 1 / kLeastFactor);
-    return std::copysign(std::min(factor * std::abs(step), most), step);
+    return std::copysign(std::min(factor * std::abs(step), max_step), step);
   }
 
   Vector Deviations() const { return prior_.GermStandardDeviation(); }

@@ -61,7 +61,7 @@ TEST(FixedQuantities, HaveTheValuesOfTheProblemOrTheModel) {
   EXPECT_EQ(find("x.gain").value, 1.5);
   EXPECT_EQ(find("v0").value, 0);
   EXPECT_EQ(find("x.delay").delayed_channel, 0);
-  EXPECT_LE(find("x.delay").most, 0.1);
+  EXPECT_LE(find("x.delay").max_step, 0.1);
 }
 
 TEST(FixedQuantities, BecomeUncertainAfterTheOthers) {

@@ -1,4 +1,4 @@
-#include "core/estimator/posterior/most_evidence.h"
+#include "core/estimator/posterior/max_log_evidence.h"
 
 #include <algorithm>
 #include <cmath>
@@ -20,7 +20,7 @@ constexpr int kStartsOfBound = 3;
 
 }  // namespace
 
-double MostEvidence(const RegionalExpansion& expansion, const Cost& cost, const Matrix& guesses) {
+double MaxLogEvidence(const RegionalExpansion& expansion, const Cost& cost, const Matrix& guesses) {
   const ExpansionDesign& design = expansion.design();
   Vector lower, upper, costs;
   SamplingBox(design, lower, upper);

@@ -10,6 +10,6 @@ namespace polyest::internal {
 // its box times the greatest density in it, found by minimizing the cost from the best of a cover
 // of the box and of the guesses (any number × n, germ coordinates). −∞ if the cost is finite at
 // none of these.
-double MostEvidence(const RegionalExpansion& expansion, const Cost& cost, const Matrix& guesses);
+double MaxLogEvidence(const RegionalExpansion& expansion, const Cost& cost, const Matrix& guesses);
 
 }  // namespace polyest::internal
