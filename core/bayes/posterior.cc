@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/bayes/domain_cover.h"
+#include "core/common/infeasible.h"
 #include "core/common/status.h"
 
 namespace polyest::internal {
@@ -64,7 +65,7 @@ class Sampler {
       costs[kept++] = costs[i];
     }
     if (kept < kMinStartingPoints) {
-      return absl::FailedPreconditionError(absl::StrFormat(
+      return InfeasibleError(absl::StrFormat(
           "only %d of %d starting points of the sampler have a finite cost", kept, start.rows()));
     }
     particles_ = {start.topRows(kept), costs.head(kept)};

@@ -32,7 +32,7 @@ struct SamplerOptions {
 // Returns particles of the posterior. `lower` and `upper` (n) bound the box in local coordinates
 // that particles must not leave; the cost must be finite somewhere in it. `guesses` (any number ×
 // n, may be none) are particles of an earlier posterior; tempering starts from them and from a
-// low-discrepancy cover of the box's part in Ω (domain_cover.h). Returns FAILED_PRECONDITION if
+// low-discrepancy cover of the box's part in Ω (domain_cover.h). Returns InfeasibleError if
 // fewer than 50 starting points have a finite cost.
 absl::StatusOr<Particles> SamplePosterior(const Cost& cost, const Vector& lower,
                                           const Vector& upper, const Matrix& guesses,

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/common/check.h"
+#include "core/common/infeasible.h"
 #include "core/common/linear_algebra.h"
 #include "core/common/parallel.h"
 #include "core/common/status.h"
@@ -44,7 +45,7 @@ absl::StatusOr<CollocationMatrix> CollocationMatrix::Factor(const Basis& basis,
   POLYEST_CHECK(points.cols() == basis.dimension());
   const int terms = basis.size();
   if (points.rows() < terms) {
-    return absl::FailedPreconditionError(absl::StrFormat(
+    return InfeasibleError(absl::StrFormat(
         "collocation: an expansion of order %d has %d terms and needs at least as many points, "
         "not %d",
         basis.order(), terms, points.rows()));
@@ -61,7 +62,7 @@ absl::StatusOr<CollocationMatrix> CollocationMatrix::Factor(const Basis& basis,
   const Conditioning conditioning = ConditioningOfTriangular(factors.r);
   result.condition_ = conditioning.number;
   if (conditioning.rank < terms || !(result.condition_ <= max_condition)) {
-    return absl::FailedPreconditionError(absl::StrFormat(
+    return InfeasibleError(absl::StrFormat(
         "collocation: %d points do not determine the %d terms of order %d (rank %d, condition "
         "number %.3g, at most %.3g allowed); use more points or a lower order",
         points.rows(), terms, basis.order(), conditioning.rank, result.condition_, max_condition));

@@ -14,7 +14,7 @@ namespace polyest::internal {
 
 class CollocationMatrix {
  public:
-  // Factors A for `points` (Q × n, Q ≥ S). Returns FAILED_PRECONDITION, naming order, terms and
+  // Factors A for `points` (Q × n, Q ≥ S). Returns InfeasibleError, naming order, terms and
   // points, if A lacks full rank or its condition number exceeds `max_condition`; on a stop request
   // its status.
   static absl::StatusOr<CollocationMatrix> Factor(const Basis& basis, const ConstMatrixRef& points,

@@ -7,6 +7,7 @@
 #include <optional>
 #include <utility>
 
+#include "core/common/infeasible.h"
 #include "core/common/status.h"
 #include "core/estimator/expansion/likelihood_power.h"
 #include "core/estimator/posterior/mixture_weighing.h"
@@ -91,7 +92,7 @@ void ComponentMixture::AddWorkOf(const ComponentMixture& other) {
 absl::StatusOr<bool> ComponentMixture::TakeOrDivide(int64_t rows, const Stop& stop) {
   for (size_t k = 0; k < components_.size(); ++k) {
     const absl::Status taken = components_[k]->TakeUpTo(rows, stop);
-    if (absl::IsFailedPrecondition(taken) && components_.size() > 1) {
+    if (IsInfeasible(taken) && components_.size() > 1) {
       LeaveOut(k);
       return true;
     }

@@ -4,6 +4,7 @@
 #include <optional>
 #include <utility>
 
+#include "core/common/infeasible.h"
 #include "core/common/status.h"
 #include "core/estimator/expansion/expansion_design.h"
 #include "core/estimator/expansion/likelihood_power.h"
@@ -71,11 +72,11 @@ absl::StatusOr<bool> SecondSearch::Search(const ResolvedProblem& problem, const 
         first_run ? *first_run : problem, store, threads,
         {.misfit = misfit, .rows = state_.row, .in_tails = in_tails_}, stop);
     // The mixture that there is goes on where no other can begin.
-    if (absl::IsFailedPrecondition(begun.status())) return false;
+    if (IsInfeasible(begun.status())) return false;
     POLYEST_ASSIGN_OR_RETURN(second_, std::move(begun));
   }
   const absl::Status taken = second_->TakeUpTo(state_.row, stop);
-  if (!taken.ok() && !absl::IsFailedPrecondition(taken)) return taken;
+  if (!taken.ok() && !IsInfeasible(taken)) return taken;
   const bool better = taken.ok() && second_->Misfit() < kBetter * misfit;
   if (better) std::swap(mixture, second_);
   mixture->AddWorkOf(*second_);

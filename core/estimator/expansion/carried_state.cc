@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/common/infeasible.h"
 #include "core/common/status.h"
 #include "core/propagation/ensemble_points.h"
 
@@ -196,7 +197,7 @@ absl::StatusOr<ExpansionState> CarriedState(const ResolvedProblem& problem,
                            RegionalExpansion::Make(problem, nullptr, design,
                                                    present.noise().ForNewExpansion(), 1, stop));
   if (fresh->controls() > 0 && kept.absorbed.control_scores.cols() == 0) {
-    return absl::FailedPreconditionError("there are no control trajectories");
+    return InfeasibleError("there are no control trajectories");
   }
   Substitution substitution(problem, present, kept, fresh->controls(), stop);
   POLYEST_RETURN_IF_ERROR(substitution.Prepare(design));

@@ -20,7 +20,7 @@ EnsembleState WithInterpolated(const ResolvedProblem& problem, const EnsembleSta
 // Returns the state that an expansion of the design has after the rows of the state `kept`, which
 // is one of `present`: the sums by its own terms, and trajectories in states interpolated between
 // those of the collocation points. `error` is Σ ρ/R of the sums in the new region. Returns
-// FailedPrecondition if a collocation matrix cannot be factored or the new expansion has control
+// InfeasibleError if a collocation matrix cannot be factored or the new expansion has control
 // trajectories and the present one none; on a stop request its status.
 absl::StatusOr<ExpansionState> CarriedState(const ResolvedProblem& problem,
                                             const RegionalExpansion& present,

@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/common/infeasible.h"
 #include "core/common/status.h"
 #include "core/estimator/expansion/carried_state.h"
 #include "core/estimator/expansion/reexpansion.h"
@@ -20,7 +21,7 @@ constexpr int64_t kLeastRows = 256;
 // Factor by which the record may become longer before the error of the states exceeds the limit.
 constexpr double kRoomToGrow = 16;
 
-absl::Status Refused(const char* why) { return absl::FailedPreconditionError(why); }
+absl::Status Refused(const char* why) { return InfeasibleError(why); }
 
 int64_t RowsToJudge(const ResolvedProblem& problem) {
   const int64_t interval = problem.problem().integration.samples_between_checkpoints;

@@ -52,7 +52,7 @@ inline int64_t RowsOfShortRecord(const ResolvedProblem& problem) {
 }
 
 // Returns an expansion of the design that has absorbed the first `rows` rows of the store, as
-// `present` has. Returns FailedPrecondition where the error might shift the posterior by more than
+// `present` has. Returns InfeasibleError where the error might shift the posterior by more than
 // `max_shift` of its standard deviations or the case is one of the above; the record must then be
 // propagated from its beginning.
 absl::StatusOr<std::unique_ptr<RegionalExpansion>> CarryOver(const ResolvedProblem& problem,

@@ -5,6 +5,7 @@
 #include <functional>
 #include <utility>
 
+#include "core/common/infeasible.h"
 #include "core/common/linear_algebra.h"
 #include "core/common/status.h"
 #include "core/estimator/expansion/likelihood_power.h"
@@ -180,7 +181,7 @@ absl::StatusOr<std::unique_ptr<RegionalExpansion>> RegionalExpansion::FromState(
   POLYEST_ASSIGN_OR_RETURN(ExpansionDesign design, DesignOf(problem, std::move(state.design)));
   absl::StatusOr<std::unique_ptr<RegionalExpansion>> expansion =
       Make(problem, &store, std::move(design), std::move(state.noise), threads, stop);
-  if (absl::IsFailedPrecondition(expansion.status())) return Inconsistent("collocation points");
+  if (IsInfeasible(expansion.status())) return Inconsistent("collocation points");
   POLYEST_RETURN_IF_ERROR(expansion.status());
   (*expansion)->next_row_ = state.absorbed.rows;
   if (state.ensemble) POLYEST_RETURN_IF_ERROR((*expansion)->RestoreRun(state, store));
@@ -255,7 +256,7 @@ absl::Status RegionalExpansion::RestoreFit(ExpansionState& state, const Stop& st
   kept_ = std::move(state.kept);
   const Matrix left = design_.points(kept_, Eigen::all);
   absl::StatusOr<CollocationMatrix> matrix = CollocationMatrix::Factor(*design_.basis, left, stop);
-  if (absl::IsFailedPrecondition(matrix.status())) return Inconsistent("collocation points");
+  if (IsInfeasible(matrix.status())) return Inconsistent("collocation points");
   POLYEST_RETURN_IF_ERROR(matrix.status());
   matrix_ = *std::move(matrix);
   return absl::OkStatus();

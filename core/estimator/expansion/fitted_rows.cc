@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/common/infeasible.h"
 #include "core/estimator/expansion/regional_expansion.h"
 
 namespace polyest::internal {
@@ -12,7 +13,7 @@ namespace polyest::internal {
 absl::Status RegionalExpansion::FitRows(int first, int count, const Stop& stop) {
   for (int begin = first; begin < first + count;) {
     absl::Status dropped = DropFailed(begin, stop);
-    if (!dropped.ok() && !absl::IsFailedPrecondition(dropped)) return dropped;
+    if (!dropped.ok() && !IsInfeasible(dropped)) return dropped;
     shortage_ = std::move(dropped);
     if (!shortage_.ok()) return absl::OkStatus();
     int end = begin + 1;

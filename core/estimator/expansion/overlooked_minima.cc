@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/bayes/cost_minima.h"
+#include "core/common/infeasible.h"
 #include "core/common/linear_algebra.h"
 #include "core/common/status.h"
 #include "core/estimator/expansion/carry_over.h"
@@ -131,7 +132,7 @@ absl::StatusOr<std::vector<double>> CostsAt(const RegionalExpansion& expansion, 
   if (!request.allowance.AllowsRecord(request.rows)) return std::vector<double>();
   const Vector inside = particles.colwise().mean().transpose();
   auto model = RunModel(expansion, etas, inside, request, stop);
-  if (absl::IsFailedPrecondition(model.status())) return std::vector<double>();
+  if (IsInfeasible(model.status())) return std::vector<double>();
   if (!model.ok()) return model.status();
   confirmed.propagated_rows = (*model)->propagated_rows();
   const RegionalExpansion::Check checks = (*model)->Checks();

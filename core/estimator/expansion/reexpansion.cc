@@ -7,6 +7,7 @@
 #include <optional>
 #include <utility>
 
+#include "core/common/infeasible.h"
 #include "core/common/status.h"
 #include "core/estimator/expansion/carry_over.h"
 #include "core/estimator/expansion/likelihood_power.h"
@@ -120,7 +121,6 @@ class Settler {
     }
     result_.postponed = result_.postponed || Withheld();
     if (Withheld()) return absl::OkStatus();
-    const bool again = IsOnPrior();
     POLYEST_ASSIGN_OR_RETURN(PriorReturn found,
                              ReturnToPrior(present_, request_, result_.particles,
                                            result_.memory.costs, result_.allowance, stop_));
@@ -129,7 +129,7 @@ class Settler {
     memory.tried = request_.rows;
     memory.in_vain = !found.expansion;
     if (!found.expansion) return absl::OkStatus();
-    if (!again) memory.stays_from = request_.rows;
+    if (!IsOnPrior()) memory.stays_from = request_.rows;
     result_.expansion = std::move(found.expansion);
     ++result_.reexpansions;
     return absl::OkStatus();
@@ -209,7 +209,7 @@ class Settler {
     absl::StatusOr<Particles> particles =
         SampleForSettlement(cost, expansion().design(), result_.particles,
                             request_.seed + static_cast<uint64_t>(attempt), stop_);
-    if (absl::IsFailedPrecondition(particles.status())) return false;
+    if (IsInfeasible(particles.status())) return false;
     if (!particles.ok()) return particles.status();
     particles_ = *std::move(particles);
     result_.particles = expansion().design().region.ManyToGerm(particles_.etas);
@@ -305,11 +305,11 @@ class Settler {
   absl::StatusOr<std::unique_ptr<RegionalExpansion>> Carried(const Region& region,
                                                              const Truncation& truncation) {
     if (request_.rows <= RowsOfShortRecord(*request_.problem)) {
-      return absl::FailedPreconditionError("the record is short");
+      return InfeasibleError("the record is short");
     }
     const int64_t cost = RowsToCarryOver(expansion(), request_.rows);
     if (!result_.allowance.Allows(request_.rows, cost)) {
-      return absl::FailedPreconditionError("too many rows would be propagated again");
+      return InfeasibleError("too many rows would be propagated again");
     }
     const double max_shift = Withheld() ? kMaxShiftUnderLimit : kMaxCarriedShift;
     const Truncation& terms = truncation.order < present().order ? present() : truncation;
@@ -338,7 +338,7 @@ class Settler {
     if (replayed.ok()) {
       if ((*replayed)->failures().size() <= expansion().failures().size()) return replayed;
       result_.propagated_rows += (*replayed)->propagated_rows();
-    } else if (!absl::IsFailedPrecondition(replayed.status())) {
+    } else if (!IsInfeasible(replayed.status())) {
       return replayed;
     }
     return Replayed(region, truncation);
@@ -349,12 +349,12 @@ class Settler {
   absl::StatusOr<bool> Move(const Region& region, const Truncation& truncation,
                             const std::optional<Region>& wider = std::nullopt) {
     absl::StatusOr<std::unique_ptr<RegionalExpansion>> moved = Carried(region, truncation);
-    if (absl::IsFailedPrecondition(moved.status()) && request_.may_replay) {
+    if (IsInfeasible(moved.status()) && request_.may_replay) {
       result_.postponed = Withheld();
       if (Withheld()) return false;
       moved = wider ? ReplayedWide(*wider, region, truncation) : Replayed(region, truncation);
     }
-    if (absl::IsFailedPrecondition(moved.status())) return false;
+    if (IsInfeasible(moved.status())) return false;
     if (!moved.ok()) return moved.status();
     if (result_.expansion) result_.propagated_rows += result_.expansion->propagated_rows();
     result_.expansion = *std::move(moved);

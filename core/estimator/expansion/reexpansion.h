@@ -71,7 +71,7 @@ absl::StatusOr<Settlement> ContinueSettlement(const RegionalExpansion& present, 
                                               SettlementRequest request, const Stop& stop);
 
 // Makes an expansion of the design and lets it absorb the first `rows` rows of the store, from
-// problem.first_row() on. Returns FailedPrecondition when its collocation matrix cannot be factored
+// problem.first_row() on. Returns InfeasibleError when its collocation matrix cannot be factored
 // or too few trajectories are left.
 absl::StatusOr<std::unique_ptr<RegionalExpansion>> Replay(const ResolvedProblem& problem,
                                                           ExpansionDesign design,
@@ -80,7 +80,7 @@ absl::StatusOr<std::unique_ptr<RegionalExpansion>> Replay(const ResolvedProblem&
                                                           int threads, const Stop& stop);
 
 // Lets the expansion absorb further rows of the store, up to the first `rows`. Returns
-// FailedPrecondition when too few trajectories are left.
+// InfeasibleError when too few trajectories are left.
 absl::Status TakeRows(const SampleStore& store, int64_t rows, const Stop& stop,
                       RegionalExpansion& expansion);
 

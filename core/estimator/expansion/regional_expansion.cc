@@ -8,6 +8,7 @@
 
 #include "core/bayes/noise.h"
 #include "core/common/check.h"
+#include "core/common/infeasible.h"
 #include "core/common/linear_algebra.h"
 #include "core/common/status.h"
 #include "core/estimator/expansion/population_of_runs.h"
@@ -206,7 +207,7 @@ absl::Status RegionalExpansion::DropFailed(int row, const Stop& stop) {
   std::erase_if(kept_, [&](int q) { return !values.row(q).allFinite(); });
   const int needed = design_.basis->size() + (problem_.problem().expansion.adaptive ? 1 : 0);
   if (static_cast<int>(kept_.size()) < needed) {
-    return absl::FailedPreconditionError(absl::StrFormat(
+    return InfeasibleError(absl::StrFormat(
         "only %d of %d trajectories could be integrated to t = %g s and the expansion needs %d; "
         "the last to fail: %s",
         kept_.size(), points(), block_.rows[static_cast<size_t>(row)].time_s, needed,

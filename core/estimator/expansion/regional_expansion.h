@@ -58,7 +58,7 @@ struct FilteredStates {
 
 class RegionalExpansion {
  public:
-  // Makes an expansion that has absorbed no rows. Returns FailedPrecondition when the design's
+  // Makes an expansion that has absorbed no rows. Returns InfeasibleError when the design's
   // collocation matrix cannot be factored, or the status of a stop request. `problem` and `store`,
   // which has the rows, must outlive the expansion; the store may be null if no input is streamed.
   static absl::StatusOr<std::unique_ptr<RegionalExpansion>> Make(const ResolvedProblem& problem,

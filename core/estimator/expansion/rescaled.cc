@@ -5,6 +5,7 @@
 #include <optional>
 #include <utility>
 
+#include "core/common/infeasible.h"
 #include "core/common/status.h"
 #include "core/estimator/expansion/expansion_state.h"
 #include "core/estimator/expansion/reexpansion.h"
@@ -82,15 +83,15 @@ absl::StatusOr<std::unique_ptr<RegionalExpansion>> Rescaled(
     const SampleStore& store, int64_t rows, int threads, const Stop& stop, double max_shift) {
   const bool is_short = rows <= RowsOfShortRecord(problem);
   if (is_short || !present.kept_state() || rows != present.absorbed_rows()) {
-    return absl::FailedPreconditionError("there is no state to go on from");
+    return InfeasibleError("there is no state to go on from");
   }
   const std::optional<Vector> factors = VarianceFactors(problem, present, noise);
-  if (!factors) return absl::FailedPreconditionError("more than scales of noise differs");
+  if (!factors) return InfeasibleError("more than scales of noise differs");
   ExpansionState state = *present.kept_state();
   if ((factors->array() != 1).any()) {
     const double error = present.OwnError() / factors->minCoeff();
     if (!(error <= max_shift * max_shift * noise.misfit)) {
-      return absl::FailedPreconditionError("the expansion is not accurate enough");
+      return InfeasibleError("the expansion is not accurate enough");
     }
     Divide(*factors, state.absorbed);
     for (size_t c = 0; c < state.previous.size(); ++c) {
@@ -106,7 +107,7 @@ absl::StatusOr<std::unique_ptr<RegionalExpansion>> Rescaled(
   absl::StatusOr<std::unique_ptr<RegionalExpansion>> expansion =
       RegionalExpansion::FromState(problem, std::move(state), store, threads, stop);
   if (absl::IsDataLoss(expansion.status())) {
-    return absl::FailedPreconditionError("the state cannot be gone on from");
+    return InfeasibleError("the state cannot be gone on from");
   }
   POLYEST_RETURN_IF_ERROR(expansion.status());
   POLYEST_RETURN_IF_ERROR(TakeRows(store, rows, stop, **expansion));

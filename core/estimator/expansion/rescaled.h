@@ -21,7 +21,7 @@
 namespace polyest::internal {
 
 // Returns an expansion like `present`, of the problem with its present tolerance, that has absorbed
-// the same `rows` rows with `noise`. Returns FailedPrecondition where the sums do not tell what
+// the same `rows` rows with `noise`. Returns InfeasibleError where the sums do not tell what
 // they would be: if anything but scales differs, if a scale that differs belongs to noise with
 // outliers or is not learned yet, if the correlation of noise is being learned, or if the expansion
 // keeps no state or its error might shift the posterior by more than `max_shift` of its standard

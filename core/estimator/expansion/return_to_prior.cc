@@ -4,6 +4,7 @@
 #include <optional>
 #include <utility>
 
+#include "core/common/infeasible.h"
 #include "core/common/status.h"
 #include "core/estimator/expansion/likelihood_power.h"
 #include "core/estimator/expansion/model_agreement.h"
@@ -74,7 +75,7 @@ absl::StatusOr<PriorReturn> ReturnToPrior(const RegionalExpansion& present,
     auto replayed = Replay(problem, *std::move(design), present.noise().ForNewExpansion(),
                            *request.store, request.rows, request.threads, stop);
     allowance.Use(request.rows, request.rows);
-    if (absl::IsFailedPrecondition(replayed.status())) break;
+    if (IsInfeasible(replayed.status())) break;
     if (!replayed.ok()) return replayed.status();
     const double shift = ShiftOf(**replayed, problem);
     if (shift <= best) {

@@ -8,6 +8,7 @@
 
 #include "core/bayes/domain_cover.h"
 #include "core/chaos/collocation_points.h"
+#include "core/common/infeasible.h"
 #include "core/common/linear_algebra.h"
 #include "core/common/status.h"
 #include "core/estimator/expansion/population_of_runs.h"
@@ -205,7 +206,7 @@ absl::Status Elimination::FindMinima() {
   minima_.push_back(marginal.Minimize(Origin(middle), StartAt(middle)));
   for (const ConditionalMinimum& minimum : minima_) {
     if (std::isfinite(minimum.value) && minimum.own.allFinite()) continue;
-    return absl::FailedPreconditionError("the parameters of a run that has ended were not found");
+    return InfeasibleError("the parameters of a run that has ended were not found");
   }
   if (problem_.population()) {
     score_ = ScoreLikelihoodOf(problem_, cost, middle, minima_.back());
@@ -241,7 +242,6 @@ Matrix Elimination::BoxOfOwn() const {
 // dη̂_φ/dη_θ = −H_φφ⁻¹ H_φθ
 RunPath Elimination::PathFound() const {
   const ConditionalMinimum& minimum = minima_.back();
-  const Region& region = expansion_->design().region;
   Vector eta = Vector::Zero(n_shared_ + n_own_);
   eta.tail(n_own_) = minimum.own;
   const Matrix hessian = OwnCost().Hessian(eta);
@@ -249,7 +249,7 @@ RunPath Elimination::PathFound() const {
   const Matrix follows = -(inverse * hessian.bottomLeftCorner(n_own_, n_shared_));
   const Matrix box = BoxOfOwn();
   RunPath path;
-  path.centre = region.ToGerm(eta)(own_);
+  path.centre = expansion_->design().region.ToGerm(eta)(own_);
   path.slope = path_.slope + box * follows * Inverse(ended_.region.axes());
   FreeOfPopulation(problem_, path.slope);
   const Vector unit = problem_.prior().GermStandardDeviation()(own_);
@@ -354,7 +354,7 @@ absl::Status Elimination::AddTo(const RunPath& path, const Stop& stop, EndedRuns
   const RunMarginal marginal(cost, OwnDirections());
   const Matrix values = Remainder(cost, marginal, sums, matrix.matrix());
   if (!values.allFinite()) {
-    return absl::FailedPreconditionError("the likelihood of a run that has ended vanishes");
+    return InfeasibleError("the likelihood of a run that has ended vanishes");
   }
   Matrix coefficients(ended.basis->size(), 1);
   Vector ignored(1);

@@ -35,7 +35,7 @@ struct EliminationRequest {
 };
 
 // Adds the run, which follows the ended ones in the record, and returns the trajectories × rows
-// that it took. `path` is where its own parameters are expected. Returns FailedPrecondition when
+// that it took. `path` is where its own parameters are expected. Returns InfeasibleError when
 // the run cannot be expanded there.
 absl::StatusOr<int64_t> EliminateRun(const EliminationRequest& request, const RunRows& rows,
                                      const RunPath& path, const Stop& stop, EndedRuns& ended);

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/common/infeasible.h"
 #include "core/common/linear_algebra.h"
 #include "core/estimator/problem/truncation.h"
 
@@ -75,7 +76,7 @@ absl::Status CheckFinite(const RunPath& path, int run) {
   if (path.centre.allFinite() && path.slope.allFinite() && path.spread.allFinite()) {
     return absl::OkStatus();
   }
-  return absl::FailedPreconditionError(absl::StrFormat(
+  return InfeasibleError(absl::StrFormat(
       "the own parameters of run %d cannot be integrated out: the posterior of what is shared is "
       "degenerate",
       run));

@@ -33,7 +33,7 @@ void FreeOfPopulation(const ResolvedProblem& problem, Matrix& slope);
 RunPath PathIn(const ResolvedProblem& problem, int run, const GermSummary& posterior,
                const Vector& centre);
 
-// Returns FailedPrecondition for a path that is not finite, as where the posterior of what is
+// Returns InfeasibleError for a path that is not finite, as where the posterior of what is
 // shared has no width.
 absl::Status CheckFinite(const RunPath& path, int run);
 

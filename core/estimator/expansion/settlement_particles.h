@@ -17,7 +17,7 @@ namespace polyest::internal {
 
 // Returns equally weighted particles in the design's local coordinates, in random order. `guesses`
 // (any number × n, may be none; germ coordinates) are particles of an earlier posterior. They
-// depend on the arguments alone. Returns FAILED_PRECONDITION if the cost is finite almost nowhere;
+// depend on the arguments alone. Returns InfeasibleError if the cost is finite almost nowhere;
 // otherwise only a stop request returns an error.
 absl::StatusOr<Particles> SampleForSettlement(const Cost& cost, const ExpansionDesign& design,
                                               const Matrix& guesses, uint64_t seed,

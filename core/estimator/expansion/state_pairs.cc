@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/common/infeasible.h"
 #include "core/common/status.h"
 #include "core/estimator/expansion/carried_state.h"
 #include "core/estimator/record/run_inputs.h"
@@ -93,7 +94,7 @@ class StatePairs {
     const EnsembleState state = WithInterpolated(problem_, *kept_.ensemble, states);
     return Restore(std::move(specification), state)
                ? absl::OkStatus()
-               : absl::FailedPreconditionError("the states cannot be gone on from");
+               : InfeasibleError("the states cannot be gone on from");
   }
 
   bool Restore(EnsembleSpecification specification, const EnsembleState& state) {
@@ -135,7 +136,7 @@ class StatePairs {
     }
     return outputs.allFinite() && log_variances.allFinite()
                ? absl::OkStatus()
-               : absl::FailedPreconditionError("trajectories have failed");
+               : InfeasibleError("trajectories have failed");
   }
 
   const ResolvedProblem& problem_;

@@ -21,7 +21,7 @@ struct PairComparison {
 };
 
 // Compares over the samples of the run of `kept`, a state of `present` inside a run, up to the
-// first `rows` rows of the store. Returns FailedPrecondition where trajectories fail.
+// first `rows` rows of the store. Returns InfeasibleError where trajectories fail.
 absl::StatusOr<PairComparison> ComparePairs(const ResolvedProblem& problem,
                                             const RegionalExpansion& present,
                                             const ExpansionState& kept, const SampleStore& store,

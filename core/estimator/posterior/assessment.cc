@@ -8,6 +8,7 @@
 #include "core/bayes/identifiability.h"
 #include "core/bayes/regularization_bias.h"
 #include "core/bayes/weighted_samples.h"
+#include "core/common/infeasible.h"
 #include "core/common/status.h"
 #include "core/estimator/expansion/control_trajectories.h"
 #include "core/estimator/expansion/likelihood_power.h"
@@ -196,7 +197,7 @@ class Assessment {
     spent_ = fitted_ + 2;
     information_ = design_.region.HessianToGerm(cost.InformationHessian(eta, spent_));
     if (information_.allFinite()) return absl::OkStatus();
-    return absl::FailedPreconditionError("the curvature of the cost at its minimum is not finite");
+    return InfeasibleError("the curvature of the cost at its minimum is not finite");
   }
 
   void DescribeParameters(const Cost& cost, const Vector& eta) {

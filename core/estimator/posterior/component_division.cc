@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/common/infeasible.h"
 #include "core/common/linear_algebra.h"
 #include "core/common/status.h"
 #include "core/estimator/expansion/reexpansion.h"
@@ -116,7 +117,7 @@ absl::StatusOr<std::vector<std::unique_ptr<MixtureComponent>>> MixtureComponent:
   for (const Piece& piece : pieces_) {
     std::unique_ptr<MixtureComponent> part(new MixtureComponent(problem_, store_, threads_));
     const absl::Status begun = part->BeginOn(*this, piece, stop);
-    if (absl::IsFailedPrecondition(begun)) {
+    if (IsInfeasible(begun)) {
       pieces_.clear();
       halves_ = false;
       whole_until_ = NextWindow(taken_, windows_from_);
@@ -136,7 +137,7 @@ absl::StatusOr<std::unique_ptr<MixtureComponent>> MixtureComponent::Unite(const 
   if (IsReplayWithheld()) return nullptr;
   std::unique_ptr<MixtureComponent> united(new MixtureComponent(problem_, store_, threads_));
   const absl::Status begun = united->ExpandOn(*this, whole, stop);
-  if (!begun.ok() && !absl::IsFailedPrecondition(begun)) return begun;
+  if (!begun.ok() && !IsInfeasible(begun)) return begun;
   allowance_.Use(taken_, taken_);
   if (!begun.ok()) return nullptr;
   united->whole_until_ = 0;

@@ -6,6 +6,7 @@
 #include <optional>
 #include <utility>
 
+#include "core/common/infeasible.h"
 #include "core/common/status.h"
 #include "core/estimator/expansion/carry_over.h"
 #include "core/estimator/expansion/control_trajectories.h"
@@ -156,7 +157,7 @@ absl::StatusOr<std::unique_ptr<RegionalExpansion>> MixtureComponent::RescaledTo(
                                                                                 const Stop& stop) {
   const int64_t cost = RowsToCarryOver(*expansion_, taken_) / 2;
   if (!allowance_.Allows(taken_, cost)) {
-    return absl::FailedPreconditionError("too many rows would be propagated again");
+    return InfeasibleError("too many rows would be propagated again");
   }
   const double max_shift = IsReplayWithheld() ? kMaxShiftUnderLimit : kMaxCarriedShift;
   auto rescaled =
@@ -169,7 +170,7 @@ absl::StatusOr<std::unique_ptr<RegionalExpansion>> MixtureComponent::RescaledTo(
 absl::StatusOr<std::unique_ptr<RegionalExpansion>> MixtureComponent::ReplayedWith(
     const LearnedNoise& noise, const Stop& stop) {
   if (IsReplayWithheld()) {
-    return absl::FailedPreconditionError("too many rows would be propagated again");
+    return InfeasibleError("too many rows would be propagated again");
   }
   auto replayed = Replay(problem_, expansion_->design(), noise.ForNewExpansion(), *store_, taken_,
                          threads_, stop);
@@ -181,7 +182,7 @@ absl::StatusOr<std::unique_ptr<RegionalExpansion>> MixtureComponent::ReplayedWit
 // they would be. Returns false, and the present noise stays, if that is put off.
 absl::StatusOr<bool> MixtureComponent::Reweigh(LearnedNoise noise, const Stop& stop) {
   auto reweighed = RescaledTo(noise, stop);
-  if (absl::IsFailedPrecondition(reweighed.status())) {
+  if (IsInfeasible(reweighed.status())) {
     if (IsReplayWithheld()) {
       if (postponed_.noise == 0) postponed_.noise = taken_;
       return false;
@@ -201,7 +202,7 @@ absl::StatusOr<std::unique_ptr<RegionalExpansion>> MixtureComponent::WithNewTole
   const LearnedNoise& noise = expansion_->noise();
   if (shift <= kMaxCarriedShift) {
     auto going_on = RescaledTo(noise, stop);
-    if (!absl::IsFailedPrecondition(going_on.status())) return going_on;
+    if (!IsInfeasible(going_on.status())) return going_on;
   }
   return ReplayedWith(noise, stop);
 }
@@ -244,7 +245,7 @@ absl::StatusOr<bool> MixtureComponent::TightenTolerance(const Stop& stop) {
   auto replayed = WithNewTolerance(shift, stop);
   if (!replayed.ok()) {
     problem_.set_relative_tolerance(present);
-    if (!absl::IsFailedPrecondition(replayed.status())) return replayed.status();
+    if (!IsInfeasible(replayed.status())) return replayed.status();
     // The present expansion stays.
     if (withheld && postponed_.tolerance == 0) postponed_.tolerance = taken_;
     return false;

@@ -19,6 +19,7 @@
 #include <utility>
 
 #include "core/bayes/cost_minima.h"
+#include "core/common/infeasible.h"
 #include "core/common/linear_algebra.h"
 #include "core/common/status.h"
 #include "core/estimator/expansion/new_runs.h"
@@ -129,7 +130,7 @@ absl::StatusOr<Matrix> MixtureComponent::ParticlesNow(const Stop& stop) const {
   request.allowance = ReplayAllowance();
   POLYEST_ASSIGN_OR_RETURN(Settlement settlement, MakeSettlement(*expansion_, request, stop));
   if (settlement.particles.rows() <= problem_.dimension()) {
-    return absl::FailedPreconditionError("the posterior of a run that has ended was not found");
+    return InfeasibleError("the posterior of a run that has ended was not found");
   }
   return std::move(settlement.particles);
 }

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "core/chaos/multi_index.h"
+#include "core/common/infeasible.h"
 #include "core/common/linear_algebra.h"
 #include "core/estimator/expansion/reexpansion.h"
 
@@ -86,7 +87,7 @@ absl::StatusOr<LeastLinear> FindLeastLinear(const ResolvedProblem& problem,
   LeastLinear found;
   const auto lines = Replay(problem, std::move(design), expansion.noise().ForNewExpansion(), store,
                             rows, threads, stop);
-  if (absl::IsFailedPrecondition(lines.status())) return found;
+  if (IsInfeasible(lines.status())) return found;
   if (!lines.ok()) return lines.status();
   found.propagated_rows = (*lines)->propagated_rows();
   double most = 0;

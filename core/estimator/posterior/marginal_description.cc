@@ -3,6 +3,7 @@
 #include <absl/strings/str_cat.h>
 
 #include "core/bayes/weighted_samples.h"
+#include "core/common/infeasible.h"
 
 namespace polyest::internal {
 
@@ -41,7 +42,7 @@ absl::Status CheckFinite(const std::vector<ParameterEstimate>& parameters) {
     const Vector numbers{
         {p.map, p.std_dev, p.mean, p.posterior_std_dev, p.lower95, p.upper95, p.contraction}};
     if (numbers.allFinite()) continue;
-    return absl::FailedPreconditionError(absl::StrCat(
+    return InfeasibleError(absl::StrCat(
         "the estimate of ", p.name, " is not finite: the posterior has gone far from the prior"));
   }
   return absl::OkStatus();

@@ -22,7 +22,7 @@ void DescribeMarginal(const PosteriorDraws& posterior, const Prior& prior, int i
 void GoByPriorIfInaccurate(const Findings& findings, const Prior& prior, int i,
                            ParameterEstimate& parameter);
 
-// Returns FAILED_PRECONDITION that names a parameter whose estimate is not finite, as where ended
+// Returns InfeasibleError that names a parameter whose estimate is not finite, as where ended
 // runs have let the posterior go far from the prior.
 absl::Status CheckFinite(const std::vector<ParameterEstimate>& parameters);
 

@@ -42,7 +42,7 @@ struct TemperedBeginning {
 
 class MixtureComponent {
  public:
-  // Makes a component over the whole prior. Returns FailedPrecondition when its expansion cannot be
+  // Makes a component over the whole prior. Returns InfeasibleError when its expansion cannot be
   // factored, or the status of a stop request. `store` must outlive the component.
   static absl::StatusOr<std::unique_ptr<MixtureComponent>> OfPrior(
       const ResolvedProblem& problem, const SampleStore* store, int threads,

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/bayes/weighted_samples.h"
+#include "core/common/infeasible.h"
 #include "core/common/status.h"
 #include "core/estimator/posterior/max_log_evidence.h"
 
@@ -104,7 +105,7 @@ class Weighing {
     const Cost cost = CostOf(request);
     absl::StatusOr<PosteriorDraws> draws =
         DrawPosterior(cost, request.expansion->design(), *request.guesses, kWeighingEffort, stop);
-    if (absl::IsFailedPrecondition(draws.status())) return absl::OkStatus();  // a cost of +∞
+    if (IsInfeasible(draws.status())) return absl::OkStatus();  // a cost of +∞
     if (!draws.ok()) return draws.status();
     weighed_[k].log_evidence = ShareOf(*request.expansion, cost, *draws).log_evidence;
     weighed_[k].particles =

@@ -61,7 +61,7 @@ void Reweigh(const ConstVectorRef& log_factors, PosteriorDraws& draws);
 void Widen(const Vector& factors, const Prior& prior, PosteriorDraws& draws);
 
 // Draws from the posterior. `guesses` (any number × n, may be empty; germ coordinates) tells where
-// the posterior was before. Returns FailedPrecondition when the cost is nowhere finite; otherwise
+// the posterior was before. Returns InfeasibleError when the cost is nowhere finite; otherwise
 // only a stop request returns an error.
 absl::StatusOr<PosteriorDraws> DrawPosterior(const Cost& cost, const ExpansionDesign& design,
                                              const Matrix& guesses, const PosteriorEffort& effort,

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/bayes/identifiability.h"
+#include "core/common/infeasible.h"
 #include "core/common/status.h"
 #include "core/estimator/posterior/component_of_estimate.h"
 #include "core/estimator/posterior/connected_elements.h"
@@ -239,7 +240,7 @@ absl::StatusOr<std::vector<Assessed>> AssessAll(std::vector<AssessmentRequest>& 
       requests[k].regularization = components.front().estimate.regularization;
     }
     absl::StatusOr<Assessed> assessed = Assess(requests[k], stop);
-    if (absl::IsFailedPrecondition(assessed.status())) {
+    if (IsInfeasible(assessed.status())) {
       failed.Update(assessed.status());
       if (k + 1 < requests.size()) AddWork(requests[k], requests[k + 1]);
       continue;

@@ -2,6 +2,7 @@
 
 #include "core/estimator/posterior/bisection.h"
 
+#include <absl/status/status.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -119,6 +120,21 @@ TEST_F(ObliqueRegion, IsCoveredByItsHalves) {
       }
     }
   }
+}
+
+// A store whose rows cannot be read any more, with the code that an infeasible expansion has, too.
+class LostStore final : public SampleStore {
+ public:
+  int64_t rows() const override { return 1; }
+  absl::Status Append(const RowBlock& /*block*/) override { return absl::OkStatus(); }
+  absl::Status Read(int64_t /*first*/, int64_t /*count*/, RowBlock& /*block*/) const override {
+    return absl::FailedPreconditionError("the store has been closed");
+  }
+};
+
+TEST_F(ObliqueRegion, IsNotSearchedWhereTheStoreFails) {
+  const auto found = FindLeastLinear(problem_, *expansion_, LostStore(), 1, 1, Stop());
+  EXPECT_EQ(found.status(), absl::FailedPreconditionError("the store has been closed"));
 }
 
 TEST(LeastLinear, IsNoParameterOfALinearModel) {
