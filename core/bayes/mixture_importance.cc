@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/bayes/log_sum_exp.h"
 #include "core/chaos/collocation_points.h"
 #include "core/common/check.h"
 #include "core/common/linear_algebra.h"
@@ -40,12 +41,6 @@ Matrix LogDensities(const std::vector<GaussianMode>& modes, const Vector& shares
     densities.col(m) = height + ProposalLogDensity(away.rowwise().squaredNorm(), n).array();
   }
   return densities;
-}
-
-// Returns log Σ_m e^{densities(i, m)} for each row i.
-Vector LogSums(const Matrix& densities) {
-  const Vector most = densities.rowwise().maxCoeff();
-  return most.array() + (densities.colwise() - most).array().exp().rowwise().sum().log();
 }
 
 // Returns the number of points of each mode, at least one: its share of all of them.
@@ -104,7 +99,7 @@ WeightedDraws ImportanceSample(const Cost& cost, const Vector& lower, const Vect
   }
   // What the numbers of points, which are rounded, have become.
   const Vector dealt = counts.cast<double>() / counts.sum();
-  const Vector log_density = LogSums(LogDensities(modes, dealt, etas));
+  const Vector log_density = LogSumExpOfRows(LogDensities(modes, dealt, etas));
   return WeighProposed(cost, lower, upper, std::move(etas), log_density);
 }
 
@@ -132,7 +127,7 @@ GaussianMode AroundAll(const std::vector<GaussianMode>& modes) {
 std::vector<GaussianMode> AdaptedTo(const WeightedDraws& draws,
                                     const std::vector<GaussianMode>& modes) {
   const Matrix densities = LogDensities(modes, SharesOf(modes), draws.etas);
-  const Vector sums = LogSums(densities);
+  const Vector sums = LogSumExpOfRows(densities);
   const double most = 1 / std::sqrt(static_cast<double>(draws.weights.size()));
   const Vector cut = draws.weights.cwiseMin(most);
   std::vector<GaussianMode> adapted = modes;

@@ -5,6 +5,7 @@
 #include <numbers>
 #include <numeric>
 
+#include "core/bayes/log_sum_exp.h"
 #include "core/chaos/beta_gamma.h"
 #include "core/chaos/germ.h"
 
@@ -47,14 +48,10 @@ double PredictiveDensity::StandardDeviation() const {
 }
 
 double PredictiveDensity::LogDensity(double z) const {
-  double largest = -kInfinity;
   const auto term = [&](Eigen::Index d) {
     return LogKernel(kernel_, (z - y_[d]) / s_[d]) - std::log(s_[d]);
   };
-  for (Eigen::Index d = 0; d < y_.size(); ++d) largest = std::max(largest, term(d));
-  double sum = 0;
-  for (Eigen::Index d = 0; d < y_.size(); ++d) sum += std::exp(term(d) - largest);
-  return largest + std::log(sum / static_cast<double>(y_.size()));
+  return LogSumExp(y_.size(), term, static_cast<double>(y_.size()));
 }
 
 double PredictiveDensity::Density(double z) const {

@@ -10,6 +10,7 @@
 #include "core/common/check.h"
 #include "core/common/linear_algebra.h"
 #include "core/common/status.h"
+#include "core/estimator/expansion/germ_summary.h"
 #include "core/estimator/problem/truncation.h"
 
 namespace polyest::internal {
@@ -216,9 +217,8 @@ Vector MiddleInside(const Prior& prior, const Region& region) {
 }
 
 Region RegionOfParticles(const Matrix& xis) {
-  const Vector mean = xis.colwise().mean().transpose();
+  const auto [mean, covariance] = SummaryOf(xis);
   const Matrix centred = xis.rowwise() - mean.transpose();
-  const Matrix covariance = centred.transpose() * centred / static_cast<double>(xis.rows());
   // Scaling to unit variances makes the axes principal whatever the scales of the germs are.
   const Vector scale = covariance.diagonal().cwiseSqrt().cwiseMax(kMinHalfWidth);
   const Matrix correlation =

@@ -4,17 +4,12 @@
 
 #include <absl/status/status.h>
 
+#include "core/estimator/expansion/germ_summary.h"
 #include "core/estimator/problem/ended_runs.h"
 #include "core/estimator/problem/resolved_problem.h"
 #include "core/estimator/record/learned_noise.h"
 
 namespace polyest::internal {
-
-// Mean and covariance of germs.
-struct GermSummary {
-  Vector mean;
-  Matrix covariance;
-};
 
 // Returns the lower triangular factor of a covariance, at least 10⁻⁹ of `unit`.
 Matrix SpreadOf(const Matrix& covariance, const Vector& unit);

@@ -5,8 +5,8 @@
 #include <utility>
 
 #include "core/common/infeasible.h"
-#include "core/common/linear_algebra.h"
 #include "core/common/status.h"
+#include "core/estimator/expansion/germ_summary.h"
 #include "core/estimator/expansion/reexpansion.h"
 #include "core/estimator/posterior/bisection.h"
 #include "core/estimator/posterior/least_linear.h"
@@ -27,14 +27,9 @@ constexpr int kPiecesAtLeast = 4;
 constexpr int kMaxDimensionToBisect = 4;
 
 // Returns the particles' mean and spread, by which outliers are judged once the posterior is known.
-PosteriorSummary SummaryOf(const Matrix& particles) {
-  PosteriorSummary summary;
-  summary.centre = particles.colwise().mean().transpose();
-  const Matrix centred = particles.rowwise() - summary.centre.transpose();
-  const SymmetricEigen eigen =
-      DecomposeSymmetric(centred.transpose() * centred / static_cast<double>(particles.rows()));
-  summary.factor = eigen.vectors * eigen.values.cwiseMax(0).cwiseSqrt().asDiagonal();
-  return summary;
+PosteriorSummary PosteriorOf(const Matrix& particles) {
+  GermSummary summary = SummaryOf(particles);
+  return {.centre = std::move(summary.mean), .factor = FactorOf(summary.covariance)};
 }
 
 }  // namespace
@@ -191,7 +186,7 @@ absl::Status MixtureComponent::ExpandOn(const MixtureComponent& parent, const Pi
   particles_ = piece.particles;
   LearnedNoise noise = parent.expansion_->noise().ForNewExpansion();
   if (noise.posterior.centre.size() > 0 && particles_.rows() > problem_.dimension()) {
-    noise.posterior = SummaryOf(particles_);
+    noise.posterior = PosteriorOf(particles_);
   }
   POLYEST_ASSIGN_OR_RETURN(expansion_, Replay(problem_, DesignOn(parent, piece), std::move(noise),
                                               *store_, taken_, threads_, stop));

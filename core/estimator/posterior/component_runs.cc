@@ -22,6 +22,7 @@
 #include "core/common/infeasible.h"
 #include "core/common/linear_algebra.h"
 #include "core/common/status.h"
+#include "core/estimator/expansion/germ_summary.h"
 #include "core/estimator/expansion/new_runs.h"
 #include "core/estimator/expansion/reexpansion.h"
 #include "core/estimator/expansion/search_domain.h"
@@ -38,14 +39,6 @@ constexpr double kMaxRescaled = 1.25;  // factor of the noise's scale
 constexpr double kMaxGain = 0.01;
 constexpr int kDrawsToBegin = 500;
 constexpr int64_t kScannedRows = 4096;
-
-GermSummary SummaryOfParticles(const Matrix& particles) {
-  GermSummary summary;
-  summary.mean = particles.colwise().mean().transpose();
-  const Matrix centred = particles.rowwise() - summary.mean.transpose();
-  summary.covariance = centred.transpose() * centred / static_cast<double>(particles.rows());
-  return summary;
-}
 
 GermSummary Shared(const ResolvedProblem& problem, const GermSummary& all) {
   const std::vector<int> shared = problem.SharedParameters();
@@ -73,11 +66,6 @@ bool HoldsWith(const EndedRuns& ended, const LearnedNoise& noise) {
     }
   }
   return true;
-}
-
-Matrix FactorOf(const Matrix& covariance) {
-  const SymmetricEigen eigen = DecomposeSymmetric(covariance);
-  return eigen.vectors * eigen.values.cwiseMax(0).cwiseSqrt().asDiagonal();
 }
 
 // Returns the runs in the first `rows` rows of the record and where they are.
@@ -149,7 +137,7 @@ absl::StatusOr<int64_t> MixtureComponent::EliminateLast(const GermSummary& poste
 absl::StatusOr<int64_t> MixtureComponent::EliminateAll(const Matrix& particles, int64_t rows,
                                                        const Stop& stop, EndedRuns& ended) const {
   const EliminationRequest request{&problem_, store_, threads_, expansion_->noise()};
-  const GermSummary posterior = SummaryOfParticles(particles);
+  const GermSummary posterior = SummaryOf(particles);
   const Matrix shared = particles(Eigen::all, problem_.SharedParameters());
   ended = WithoutEndedRuns(problem_, RegionOfParticles(shared), Shared(problem_, posterior),
                            expansion_->noise());
@@ -178,7 +166,7 @@ absl::Status MixtureComponent::BeginRunAlone(int run, const Stop& stop) {
   std::optional<Matrix> particles;
   if (!posterior) {
     POLYEST_ASSIGN_OR_RETURN(particles, ParticlesNow(stop));
-    posterior = SummaryOfParticles(*particles);
+    posterior = SummaryOf(*particles);
   }
   const EndedRuns* before = problem_.ended_runs();
   const bool holds = before != nullptr && HoldsAbout(*before, Shared(problem_, *posterior)) &&
@@ -190,7 +178,7 @@ absl::Status MixtureComponent::BeginRunAlone(int run, const Stop& stop) {
   } else {
     if (!particles) {
       POLYEST_ASSIGN_OR_RETURN(particles, ParticlesNow(stop));
-      posterior = SummaryOfParticles(*particles);
+      posterior = SummaryOf(*particles);
     }
     POLYEST_ASSIGN_OR_RETURN(work, EliminateAll(*particles, taken_, stop, *ended));
   }

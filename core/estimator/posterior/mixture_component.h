@@ -11,6 +11,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/estimator/expansion/germ_summary.h"
 #include "core/estimator/expansion/reexpansion.h"
 #include "core/estimator/expansion/regional_expansion.h"
 #include "core/estimator/expansion/replay_allowance.h"

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/bayes/log_sum_exp.h"
 #include "core/common/linear_algebra.h"
 #include "core/estimator/posterior/mixture_share.h"
 
@@ -62,10 +63,8 @@ std::optional<double> LogSumOfExponentials(const std::vector<std::optional<doubl
   if (values.empty() || !std::ranges::all_of(values, [](const auto& one) { return !!one; })) {
     return std::nullopt;
   }
-  const double largest = **std::ranges::max_element(values);
-  double sum = 0;
-  for (const std::optional<double>& value : values) sum += std::exp(*value - largest);
-  return largest + std::log(sum);
+  return LogSumExp(std::ssize(values),
+                   [&](Eigen::Index i) { return *values[static_cast<size_t>(i)]; });
 }
 
 }  // namespace polyest::internal

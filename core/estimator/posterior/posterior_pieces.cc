@@ -8,6 +8,7 @@
 
 #include "core/bayes/cost_minima.h"
 #include "core/common/linear_algebra.h"
+#include "core/estimator/expansion/germ_summary.h"
 #include "core/estimator/expansion/search_domain.h"
 #include "core/estimator/posterior/cost_slice.h"
 
@@ -29,10 +30,7 @@ struct Gap {
   Rows below, above;
 };
 
-Matrix Covariance(const Matrix& points) {
-  const Matrix centred = points.rowwise() - points.colwise().mean();
-  return centred.transpose() * centred / static_cast<double>(points.rows());
-}
+Matrix Covariance(const Matrix& points) { return SummaryOf(points).covariance; }
 
 class PieceFinder {
  public:
