@@ -189,13 +189,10 @@ void serialize(Archive& archive, ComponentState& component) {
   archive(component.runs, component.ended_runs, component.relative_tolerance, component.expansion,
           component.particles, component.memory, component.weight, component.room);
   Flag(archive, component.bisected);
-  archive(component.taken, component.windows_from, component.window_end, component.edges_row,
-          component.ahead_row, component.patient_until, component.whole_until,
-          component.settled_row, component.settlements_at_row, component.comparable_row,
-          component.settlements, component.reexpansions, component.abandoned_rows,
-          component.summary, component.allowance.used, component.allowance.used_at,
-          component.allowance.exempt_at, component.postponed.expansion, component.postponed.noise,
-          component.postponed.tolerance);
+  archive(component.taken, component.schedule, component.settlements, component.reexpansions,
+          component.abandoned_rows, component.summary, component.allowance.used,
+          component.allowance.used_at, component.allowance.exempt_at, component.postponed.expansion,
+          component.postponed.noise, component.postponed.tolerance);
 }
 
 template <class Archive>

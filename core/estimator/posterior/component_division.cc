@@ -45,7 +45,7 @@ int MaxComponents(const ResolvedProblem& problem) {
 // Pieces are not looked for before the noise is learned, because the noise would decide between
 // them.
 bool MixtureComponent::MayLookForPieces() const {
-  if (!adaptive() || taken_ < whole_until_ || room_ < 2 || IsReplayWithheld()) return false;
+  if (!adaptive() || schedule_.StaysWhole(taken_) || room_ < 2 || IsReplayWithheld()) return false;
   for (size_t c = 0; c < expansion_->noise().channels.size(); ++c) {
     const bool unknown = problem_.problem().measured[c].noise.unknown;
     if (unknown && !expansion_->noise().channels[c].learned) return false;
@@ -73,7 +73,7 @@ bool MixtureComponent::LookForPieces() {
 }
 
 bool MixtureComponent::MayBisect() const {
-  return adaptive() && taken_ >= whole_until_ && room_ > 1 && !IsReplayWithheld() &&
+  return adaptive() && !schedule_.StaysWhole(taken_) && room_ > 1 && !IsReplayWithheld() &&
          problem_.dimension() <= kMaxDimensionToBisect;
 }
 
@@ -115,7 +115,7 @@ absl::StatusOr<std::vector<std::unique_ptr<MixtureComponent>>> MixtureComponent:
     if (IsInfeasible(begun)) {
       pieces_.clear();
       halves_ = false;
-      whole_until_ = NextWindow(taken_, windows_from_);
+      schedule_.StayWhole(taken_);
       parts.clear();
       allowance_.Use(taken_, taken_);
       return parts;
@@ -135,7 +135,7 @@ absl::StatusOr<std::unique_ptr<MixtureComponent>> MixtureComponent::Unite(const 
   if (!begun.ok() && !IsInfeasible(begun)) return begun;
   allowance_.Use(taken_, taken_);
   if (!begun.ok()) return nullptr;
-  united->whole_until_ = 0;
+  united->schedule_.MayDivideAgain();
   united->bisected_ = false;
   const Cost cost = united->expansion_->MakeCost(problem_.problem().regularization);
   if (!(LargestShift(*united->expansion_, cost.power()) <= kMinShiftToBisect)) return nullptr;
@@ -146,7 +146,7 @@ void MixtureComponent::set_element(Element element) {
   if (element.bounds().size() == this->element().bounds().size()) return;
   bisected_ = bisected_ && !element.bounds().empty();
   expansion_->set_element(std::move(element));
-  edges_row_ = taken_;  // some of the region's edges are not the element's any more
+  schedule_.LookAtEdgesAt(taken_);  // some of the region's edges are not the element's any more
 }
 
 // Returns the design over the piece's region. Its check points are particles of the piece, or cover
@@ -175,14 +175,14 @@ ExpansionDesign MixtureComponent::DesignOn(const MixtureComponent& parent,
 // Starts at the parent's row, over the region of one of the parent's pieces.
 absl::Status MixtureComponent::ExpandOn(const MixtureComponent& parent, const Piece& piece,
                                         const Stop& stop) {
-  taken_ = window_end_ = parent.taken_;
-  windows_from_ = parent.windows_from_;
+  taken_ = parent.taken_;
+  schedule_ = parent.schedule_.OfPart(taken_);
   summary_ = parent.summary_;
   settlements_ = parent.settlements_;
   bisected_ = parent.bisected_ || parent.halves_;
   tempered_ = parent.tempered_;
   postponed_ = parent.postponed_;
-  if (!parent.halves_) whole_until_ = NextWindow(taken_, windows_from_);
+  if (!parent.halves_) schedule_.StayWhole(taken_);
   particles_ = piece.particles;
   LearnedNoise noise = parent.expansion_->noise().ForNewExpansion();
   if (noise.posterior.centre.size() > 0 && particles_.rows() > problem_.dimension()) {
@@ -201,7 +201,7 @@ absl::Status MixtureComponent::BeginOn(const MixtureComponent& parent, const Pie
                                        const Stop& stop) {
   POLYEST_RETURN_IF_ERROR(ExpandOn(parent, piece, stop));
   bool moved = !parent.halves_;
-  for (int i = 0; moved && !must_divide() && i < kMaxSettlementsAtRow; ++i) {
+  for (int i = 0; moved && !must_divide() && i < SettlementSchedule::kMaxSettlementsAtRow; ++i) {
     POLYEST_ASSIGN_OR_RETURN(moved, MoveToPosterior(stop, /*may_raise_order=*/true));
   }
   return absl::OkStatus();

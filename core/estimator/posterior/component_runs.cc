@@ -213,12 +213,6 @@ absl::Status MixtureComponent::RenewEndedRuns(const Stop& stop) {
   return absl::OkStatus();
 }
 
-// A new run tells nothing yet, however long the record is.
-void MixtureComponent::CountWindowsAnew() {
-  windows_from_ = patient_until_ = taken_;
-  window_end_ = taken_ + 2;
-}
-
 // Goes on with a problem whose run has no rows yet; `shared` is the posterior of the shared germs.
 absl::Status MixtureComponent::GoOnWith(ResolvedProblem next, const GermSummary& shared,
                                         const Stop& stop) {
@@ -233,7 +227,7 @@ absl::Status MixtureComponent::GoOnWith(ResolvedProblem next, const GermSummary&
   Matrix draws = DrawsForNewRun(next, shared.mean, factor, kDrawsToBegin).etas;
   POLYEST_RETURN_IF_ERROR(
       ReplayAs(std::move(next), std::move(design), std::move(noise), std::move(draws), stop));
-  CountWindowsAnew();
+  schedule_.CountAnewFrom(taken_);
   return absl::OkStatus();
 }
 

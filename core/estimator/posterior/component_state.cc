@@ -45,11 +45,12 @@ bool IsMemoryFor(const ResolvedProblem& problem, const SettlementMemory& memory,
 }
 
 bool IsStateFor(const ResolvedProblem& problem, const ComponentState& state) {
-  return state.taken > 0 && problem.first_row() <= state.taken && state.windows_from >= 0 &&
-         state.windows_from <= state.taken && state.expansion.absorbed.rows == state.taken &&
+  return state.taken > 0 && problem.first_row() <= state.taken &&
+         SettlementSchedule::IsState(state.schedule, state.taken) &&
+         state.expansion.absorbed.rows == state.taken &&
          state.particles.cols() == problem.dimension() && state.particles.allFinite() &&
          IsMemoryFor(problem, state.memory, state.particles, state.taken) && state.weight >= 0 &&
-         state.weight <= 1 && state.room >= 1 && state.settlements_at_row >= 0 &&
+         state.weight <= 1 && state.room >= 1 &&
          IsSummaryFor(problem, state.summary, state.taken) &&
          ReplayAllowance::IsState(state.allowance, state.taken);
 }
@@ -123,15 +124,7 @@ ComponentState MixtureComponent::State() const {
   state.room = room_;
   state.bisected = bisected_;
   state.taken = taken_;
-  state.windows_from = windows_from_;
-  state.window_end = window_end_;
-  state.edges_row = edges_row_;
-  state.ahead_row = ahead_row_;
-  state.patient_until = patient_until_;
-  state.whole_until = whole_until_;
-  state.settled_row = settled_row_;
-  state.settlements_at_row = settlements_at_row_;
-  state.comparable_row = comparable_row_;
+  state.schedule = schedule_.state();
   state.settlements = settlements_;
   state.reexpansions = reexpansions_;
   state.abandoned_rows = abandoned_rows_;
@@ -163,15 +156,7 @@ absl::StatusOr<std::unique_ptr<MixtureComponent>> MixtureComponent::FromState(
   component->room_ = state.room;
   component->bisected_ = state.bisected;
   component->taken_ = state.taken;
-  component->windows_from_ = state.windows_from;
-  component->window_end_ = state.window_end;
-  component->edges_row_ = state.edges_row;
-  component->ahead_row_ = state.ahead_row;
-  component->patient_until_ = state.patient_until;
-  component->whole_until_ = state.whole_until;
-  component->settled_row_ = state.settled_row;
-  component->settlements_at_row_ = state.settlements_at_row;
-  component->comparable_row_ = state.comparable_row;
+  component->schedule_.Restore(state.schedule);
   component->settlements_ = state.settlements;
   component->reexpansions_ = state.reexpansions;
   component->abandoned_rows_ = state.abandoned_rows;

@@ -9,6 +9,7 @@
 #include "core/estimator/expansion/expansion_state.h"
 #include "core/estimator/expansion/replay_allowance.h"
 #include "core/estimator/expansion/settlement_memory.h"
+#include "core/estimator/posterior/settlement_schedule.h"
 #include "core/estimator/record/record_summary.h"
 
 namespace polyest::internal {
@@ -24,15 +25,7 @@ struct ComponentState {
   int room = 1;
   bool bisected = false;
   int64_t taken = 0;
-  int64_t windows_from = 0;
-  int64_t window_end = 0;
-  int64_t edges_row = 0;
-  int64_t ahead_row = 0;
-  int64_t patient_until = 0;
-  int64_t whole_until = 0;
-  int64_t settled_row = -1;
-  int settlements_at_row = 0;
-  int64_t comparable_row = -1;
+  SettlementSchedule::State schedule;
   uint64_t settlements = 0;
   int reexpansions = 0;
   int64_t abandoned_rows = 0;

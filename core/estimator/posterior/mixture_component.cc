@@ -1,7 +1,7 @@
 #include "core/estimator/posterior/mixture_component.h"
 
 #include <algorithm>
-#include <cmath>
+#include <limits>
 #include <utility>
 
 #include "core/common/status.h"
@@ -21,30 +21,15 @@ constexpr int64_t kBlockRows = 64;
 // At the end of a window the expansion is compared with the model. It is settled again when the
 // posterior's means may be wrong by this many standard deviations.
 constexpr double kMaxShift = 0.08;
-constexpr double kWindowGrowth = 1.3;
-// After a settlement that did not help, further rows are taken with their discount before the next
-// attempt: the record since the windows' beginning, divided by this number.
-constexpr int64_t kAttemptsPerRecord = 8;
-// The region's edges are looked at again after the record since the windows' beginning, divided by
-// this number.
-constexpr int64_t kLooksPerRecord = 20;
 // The fraction of the error that sums may have to be carried over from which on the expansion moves
 // ahead of need. An error of order p + 1 in a phase grows as N^(p + 1.5), at order 3 twentyfold
 // while the record doubles, and most of it is in the last states.
 constexpr double kAheadOfNeed = 0.004;
-// Where the posterior has not contracted enough, that is looked at again after the record divided
-// by this number.
-constexpr int64_t kLooksAhead = 10;
 
 // Returns the first of the thousand seeds that a settlement may use.
 uint64_t SeedOfSettlement(uint64_t settlements) { return 1000 * (settlements + 1); }
 
 }  // namespace
-
-int64_t NextWindow(int64_t rows, int64_t from) {
-  const auto window = static_cast<double>(rows - from);
-  return std::max(rows + 2, from + static_cast<int64_t>(std::ceil(kWindowGrowth * window)));
-}
 
 MixtureComponent::MixtureComponent(const ResolvedProblem& problem, const SampleStore* store,
                                    int threads)
@@ -116,7 +101,7 @@ absl::Status MixtureComponent::BeginRun(int run, const Stop& stop) {
   Matrix particles = ParticlesForNewRuns(grown, particles_);
   POLYEST_RETURN_IF_ERROR(
       ReplayAs(std::move(grown), std::move(design), std::move(noise), std::move(particles), stop));
-  CountWindowsAnew();
+  schedule_.CountAnewFrom(taken_);
   return absl::OkStatus();
 }
 
@@ -154,7 +139,7 @@ absl::StatusOr<bool> MixtureComponent::AbsorbBlock(const RowBlock& block, const 
     if (raised) return false;
     const bool short_of_trajectories = row == expansion_->fitted_rows();
     bool too_coarse = false;
-    const bool coarse = !short_of_trajectories && taken_ >= patient_until_ &&
+    const bool coarse = !short_of_trajectories && !schedule_.IsPatient(taken_) &&
                         expansion_->ResidualToNoise(row) > CoarseResidual();
     if (short_of_trajectories || (adaptive() && coarse)) {
       POLYEST_ASSIGN_OR_RETURN(const bool moved, RefineBefore(row, stop));
@@ -182,27 +167,26 @@ absl::StatusOr<bool> MixtureComponent::FinishRow(const Stop& stop) {
   }
   if (must_divide()) return true;
   bool settled = false;
-  if (WindowEnds()) {
+  if ((adaptive() || learns_noise_) && schedule_.WindowEnds(taken_)) {
     POLYEST_ASSIGN_OR_RETURN(settled, EndWindow(stop));
-  } else if (LooksAtEdges()) {
+  } else if (adaptive() && schedule_.LooksAtEdges(taken_)) {
     POLYEST_ASSIGN_OR_RETURN(settled, MoveIfLeaning(stop));
   } else if (LooksAhead()) {
     POLYEST_ASSIGN_OR_RETURN(settled, MoveAheadOfNeed(stop));
   }
-  ahead_row_ = std::max(ahead_row_, taken_ + 1);  // a row is looked at once, in one of these ways
+  schedule_.RowSeen(taken_);
   return moved || settled;
 }
 
 // Handles a next row at which the present expansion is too coarse or too few trajectories are left.
 absl::StatusOr<bool> MixtureComponent::RefineBefore(int row, const Stop& stop) {
   const bool short_of_trajectories = row == expansion_->fitted_rows();
-  if (settled_row_ != taken_) settlements_at_row_ = 0;
-  settled_row_ = taken_;
+  const bool may_settle = schedule_.MaySettleBefore(taken_);
   // There is no expansion to stay with.
   if (short_of_trajectories) allowance_.ExemptAt(taken_);
-  if (adaptive() && taken_ > 0 && settlements_at_row_ < kMaxSettlementsAtRow) {
+  if (adaptive() && taken_ > 0 && may_settle) {
     POLYEST_ASSIGN_OR_RETURN(const bool moved, MoveToPosterior(stop, !short_of_trajectories));
-    ++settlements_at_row_;
+    schedule_.CountAttempt();
     if (moved) return true;
   }
   if (LookForPieces()) return true;
@@ -213,7 +197,7 @@ absl::StatusOr<bool> MixtureComponent::RefineBefore(int row, const Stop& stop) {
     return expansion_->shortage();
   }
   if (MayBisect()) return false;
-  patient_until_ = taken_ + 1 + (taken_ - windows_from_) / kAttemptsPerRecord;
+  schedule_.BePatient(taken_);
   return false;
 }
 
@@ -227,15 +211,10 @@ absl::StatusOr<bool> MixtureComponent::EndWindow(const Stop& stop) {
     moved = moved || settled;
   }
   row_end_ = {};  // where nothing was settled
-  window_end_ = NextWindow(taken_, windows_from_);
   const int64_t to_learn = MinSamplesForNoise(problem_);
-  if (learns_noise_ && taken_ < to_learn) window_end_ = std::min(window_end_, to_learn);
-  edges_row_ = NextLook();
+  const bool learns_soon = learns_noise_ && taken_ < to_learn;
+  schedule_.EndWindow(taken_, learns_soon ? to_learn : std::numeric_limits<int64_t>::max());
   return moved;
-}
-
-int64_t MixtureComponent::NextLook() const {
-  return taken_ + 1 + (taken_ - windows_from_) / kLooksPerRecord;
 }
 
 bool MixtureComponent::Leans() const {
@@ -249,7 +228,7 @@ absl::StatusOr<bool> MixtureComponent::MoveIfLeaning(const Stop& stop) {
   if (Leans()) {
     POLYEST_ASSIGN_OR_RETURN(settled, MoveToPosterior(stop, /*may_raise_order=*/false));
   }
-  edges_row_ = NextLook();
+  schedule_.EdgesSeen(taken_);
   return settled;
 }
 
@@ -257,7 +236,7 @@ absl::StatusOr<bool> MixtureComponent::MoveIfLeaning(const Stop& stop) {
 // at halfway between two states that it keeps, when there are rows enough to judge by, and for the
 // first time just before the record becomes long.
 bool MixtureComponent::LooksAhead() const {
-  if (!adaptive() || taken_ < ahead_row_ || !expansion_->kept_state()) return false;
+  if (!adaptive() || !schedule_.MayLookAhead(taken_) || !expansion_->kept_state()) return false;
   const int64_t interval = problem_.problem().integration.samples_between_checkpoints;
   if (taken_ <= RowsOfShortRecord(problem_) - interval) return false;
   return taken_ - expansion_->kept_state()->absorbed.rows == std::max<int64_t>(1, interval / 2);
@@ -269,12 +248,16 @@ absl::StatusOr<bool> MixtureComponent::MoveAheadOfNeed(const Stop& stop) {
   const bool is_short = taken_ <= RowsOfShortRecord(problem_);
   const bool may_carry = shift <= kMaxCarriedShift || is_short || IsReplayWithheld();
   if (shift < kAheadOfNeed * kMaxCarriedShift || !may_carry) {
-    ahead_row_ = taken_ + 1;
+    schedule_.LookedAhead(taken_);
     return false;
   }
   POLYEST_ASSIGN_OR_RETURN(const bool settled, MoveToPosterior(stop, /*may_raise_order=*/false,
                                                                /*may_replay=*/is_short));
-  ahead_row_ = settled ? taken_ + 1 : taken_ + taken_ / kLooksAhead;
+  if (settled) {
+    schedule_.LookedAhead(taken_);
+  } else {
+    schedule_.MovedAheadInVain(taken_);
+  }
   return settled;
 }
 
@@ -291,7 +274,7 @@ absl::StatusOr<bool> MixtureComponent::MoveWhileInaccurate(const Stop& stop) {
   };
   const auto accurate = [&] { return shift() <= kMaxShift; };
   // Each settlement may raise the order, so several may be needed.
-  for (; row_end_.settlements < (automatic_order() ? kMaxSettlementsAtRow : 1);
+  for (; row_end_.settlements < (automatic_order() ? SettlementSchedule::kMaxSettlementsAtRow : 1);
        ++row_end_.settlements) {
     const bool follows = accurate();
     if (follows && !Leans()) {
@@ -362,7 +345,7 @@ bool MixtureComponent::Take(Settlement settlement) {
 }
 
 absl::Status MixtureComponent::MakeComparable(const Stop& stop) {
-  if (comparable_row_ == taken_) return absl::OkStatus();
+  if (schedule_.IsComparable(taken_)) return absl::OkStatus();
   POLYEST_RETURN_IF_ERROR(Recover(stop));
   const Cost cost = expansion_->MakeCost(problem_.problem().regularization);
   if (!AgreementWithModel(*expansion_, cost).mean_difference) {
@@ -371,7 +354,7 @@ absl::Status MixtureComponent::MakeComparable(const Stop& stop) {
     POLYEST_ASSIGN_OR_RETURN(Settlement settlement, MakeSettlement(*expansion_, request, stop));
     Take(std::move(settlement));
   }
-  comparable_row_ = taken_;
+  schedule_.SetComparable(taken_);
   return absl::OkStatus();
 }
 

@@ -19,13 +19,10 @@
 #include "core/estimator/expansion/settlement_memory.h"
 #include "core/estimator/posterior/assessment.h"
 #include "core/estimator/posterior/posterior_pieces.h"
+#include "core/estimator/posterior/settlement_schedule.h"
 #include "core/estimator/record/record_summary.h"
 
 namespace polyest::internal {
-
-// Returns the row at which a window starting at `rows` ends. Windows grow in proportion to the
-// number of rows since `from` and have at least two rows.
-int64_t NextWindow(int64_t rows, int64_t from = 0);
 
 // Returns the maximum number of components of the problem's posterior. The budget is the number of
 // trajectories that they propagate together, so that it does not depend on their order or
@@ -99,7 +96,6 @@ class MixtureComponent {
   AssessmentRequest RequestAssessment() const;
 
  private:
-  static constexpr int kMaxSettlementsAtRow = 4;
   // At the end of a window an element is bisected when the posterior's means may be wrong by so
   // many standard deviations and moving has not helped.
   static constexpr double kMinShiftToBisect = 0.25;
@@ -110,18 +106,15 @@ class MixtureComponent {
 
   bool adaptive() const { return problem_.problem().expansion.adaptive; }
   bool automatic_order() const { return !problem_.problem().expansion.order; }
-  bool LooksAtEdges() const { return adaptive() && taken_ >= edges_row_; }
   bool LooksAhead() const;
   // Whether the limit forbids to propagate the record so far again.
   bool IsReplayWithheld() const { return !allowance_.AllowsRecord(taken_); }
-  bool WindowEnds() const { return (adaptive() || learns_noise_) && taken_ >= window_end_; }
   absl::Status Recover(const Stop& stop);
   absl::Status ReadBlock(int64_t rows, RowBlock& block, const Stop& stop);
   absl::Status BeginRun(int run, const Stop& stop);
   absl::Status BeginRunAlone(int run, const Stop& stop);
   absl::Status ReplayAs(ResolvedProblem problem, ExpansionDesign design, LearnedNoise noise,
                         Matrix particles, const Stop& stop);
-  void CountWindowsAnew();
   absl::Status GoOnWith(ResolvedProblem next, const GermSummary& shared, const Stop& stop);
   absl::StatusOr<Matrix> ParticlesNow(const Stop& stop) const;
   std::optional<GermSummary> GaussianPosterior(const Stop& stop) const;
@@ -167,7 +160,6 @@ class MixtureComponent {
   };
   double CoarseResidual() const;
   bool ReviseMisfit(const Stop& stop);
-  int64_t NextLook() const;
   bool Leans() const;
   absl::StatusOr<bool> MoveIfLeaning(const Stop& stop);
   absl::StatusOr<bool> MoveAheadOfNeed(const Stop& stop);
@@ -199,17 +191,9 @@ class MixtureComponent {
   int room_ = 1;
   double weight_ = 1;
   int64_t taken_ = 0;
-  int64_t windows_from_ = 0;  // row from which the present windows are counted
-  int64_t window_end_ = 2;
-  int64_t edges_row_ = 2;       // row at which to look at the region's edges next
-  int64_t ahead_row_ = 0;       // no move ahead of need before this row
-  int64_t patient_until_ = 0;   // rows before this one are taken regardless of residual
-  int64_t whole_until_ = 0;     // no search for pieces before this row
+  SettlementSchedule schedule_;
   TemperedBeginning tempered_;  // what is left of it
   RowEnd row_end_;
-  int64_t settled_row_ = -1;     // row before which the last settlement was attempted
-  int settlements_at_row_ = 0;   // attempted there
-  int64_t comparable_row_ = -1;  // rows at which MakeComparable was done last
   uint64_t settlements_ = 0;
   int reexpansions_ = 0;
   int64_t abandoned_rows_ = 0;  // propagated by expansions that were replaced

@@ -1,0 +1,66 @@
+#include "core/estimator/posterior/settlement_schedule.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace polyest::internal {
+namespace {
+
+constexpr double kWindowGrowth = 1.3;
+// After a settlement that did not help, further rows are taken with their discount before the next
+// attempt: the record since the windows' beginning, divided by this number.
+constexpr int64_t kAttemptsPerRecord = 8;
+// The region's edges are looked at again after the record since the windows' beginning, divided by
+// this number.
+constexpr int64_t kLooksPerRecord = 20;
+// Where the posterior has not contracted enough, that is looked at again after the record divided
+// by this number.
+constexpr int64_t kLooksAhead = 10;
+
+}  // namespace
+
+int64_t NextWindow(int64_t rows, int64_t from) {
+  const auto window = static_cast<double>(rows - from);
+  return std::max(rows + 2, from + static_cast<int64_t>(std::ceil(kWindowGrowth * window)));
+}
+
+void SettlementSchedule::EndWindow(int64_t rows, int64_t latest_end) {
+  state_.window_end = std::min(NextWindow(rows, state_.windows_from), latest_end);
+  EdgesSeen(rows);
+}
+
+void SettlementSchedule::EdgesSeen(int64_t rows) {
+  state_.edges_row = rows + 1 + (rows - state_.windows_from) / kLooksPerRecord;
+}
+
+void SettlementSchedule::MovedAheadInVain(int64_t rows) {
+  state_.ahead_row = rows + rows / kLooksAhead;
+}
+
+void SettlementSchedule::RowSeen(int64_t rows) {
+  state_.ahead_row = std::max(state_.ahead_row, rows + 1);
+}
+
+bool SettlementSchedule::MaySettleBefore(int64_t rows) {
+  if (state_.settled_row != rows) state_.settlements_at_row = 0;
+  state_.settled_row = rows;
+  return state_.settlements_at_row < kMaxSettlementsAtRow;
+}
+
+void SettlementSchedule::BePatient(int64_t rows) {
+  state_.patient_until = rows + 1 + (rows - state_.windows_from) / kAttemptsPerRecord;
+}
+
+void SettlementSchedule::CountAnewFrom(int64_t rows) {
+  state_.windows_from = state_.patient_until = rows;
+  state_.window_end = rows + 2;
+}
+
+SettlementSchedule SettlementSchedule::OfPart(int64_t rows) const {
+  SettlementSchedule part;
+  part.state_.window_end = rows;
+  part.state_.windows_from = state_.windows_from;
+  return part;
+}
+
+}  // namespace polyest::internal
