@@ -21,7 +21,6 @@
 
 #include <memory>
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "core/bayes/mismatch.h"
@@ -30,6 +29,7 @@
 #include "core/chaos/packed_matrix.h"
 #include "core/estimator/expansion/absorbed_rows.h"
 #include "core/estimator/expansion/expansion_design.h"
+#include "core/estimator/expansion/failed_trajectory.h"
 #include "core/estimator/record/data_facts.h"
 #include "core/estimator/record/learned_noise.h"
 #include "core/estimator/record/run_inputs.h"
@@ -38,15 +38,6 @@
 #include "polyest/samples.h"
 
 namespace polyest::internal {
-
-// A trajectory that was left out, with the parameters for which it failed.
-struct FailedTrajectory {
-  Vector theta;
-  int run = 0;
-  double time_s = 0;
-  int flag = 0;
-  std::string reason;
-};
 
 struct ExpansionState;
 
@@ -193,12 +184,24 @@ class RegionalExpansion {
                     ExpansionDesign design, LearnedNoise noise, CollocationMatrix matrix,
                     int threads);
 
+  // Runs and the states kept between their rows (kept_state.cc, expansion_state.cc).
   void StartRun(int run, int64_t first_row, int64_t first_knots);
   void KeepState(int next_run);
   double InputReach(int run) const;
-  absl::Status PropagateRun(int first, int count, const Stop& stop);
   absl::Status RestoreFit(ExpansionState& state, const Stop& stop);
   absl::Status RestoreRun(const ExpansionState& state, const SampleStore& store);
+
+  // Trajectories, or filters in their place, and their controls (control_trajectories.cc,
+  // filtered_samples.cc).
+  absl::Status PropagateRun(int first, int count, const Stop& stop);
+  absl::Status Advance(int first, int count, const Stop& stop);
+  int CountControls() const;
+  void StartControls(int run);
+  void StartFilters(int run);
+  absl::Status AdvanceFilters(int first, int count, const Stop& stop);
+  void SubstituteInnovations(int first, int count);
+
+  // The fit of what they give, without those that have failed (fitted_rows.cc).
   absl::Status FitRows(int first, int count, const Stop& stop);
   void FitColumns(int first, int count, const Matrix& all_values, Matrix& coefficients,
                   Vector& residual);
@@ -206,8 +209,8 @@ class RegionalExpansion {
   bool FailsAt(int row) const;
   absl::Status DropFailed(int row, const Stop& stop);
   void NoteFailures(int row);
-  void TakeEndedRuns();
-  void BeginSums();
+
+  // Noise and outliers as the posterior's centre tells them (noise_at_centre.cc, outliers.cc).
   void LookFromPosterior();
   void Linearize();
   void PredictNoise(int first);
@@ -218,11 +221,15 @@ class RegionalExpansion {
   }
   ScoredSample Scored(int channel, const ConstVectorRef& coefficients, double z, double variance,
                       double own_error) const;
-  void EndRunOfSums();
   double DeviationFromCentre(int channel, const ConstVectorRef& coefficients, double z,
                              double variance) const;
   void CountOutlier(int channel, const ConstVectorRef& coefficients, double z, double variance,
                     double deviation);
+
+  // The sums of the samples, begun with those of ended runs (ended_runs_sums.cc).
+  void BeginSums();
+  void TakeEndedRuns();
+  void EndRunOfSums();
   // Adds the sample of a channel in the row, if there is one.
   void AbsorbSample(int row, int channel);
   void AddDifference(int channel, const ConstVectorRef& coefficients, double error,
@@ -230,15 +237,11 @@ class RegionalExpansion {
   void AddToBlocks(int channel, const ConstVectorRef& coefficients, double z, double variance);
   void AddToProfile(int row, int channel, const ConstVectorRef& coefficients, double z,
                     double variance);
-  void Normalize(double noise, double own_error, double lack);
-  void Compare(int column, double z, double variance);
-  int CountControls() const;
-  void StartControls(int run);
-  absl::Status Advance(int first, int count, const Stop& stop);
-  void StartFilters(int run);
-  absl::Status AdvanceFilters(int first, int count, const Stop& stop);
-  void SubstituteInnovations(int first, int count);
   void AddLogVariance(int column, double noise, double variance);
+  void Normalize(double noise, double own_error, double lack);
+
+  // What check points and controls tell of the expansion's error (control_trajectories.cc).
+  void Compare(int column, double z, double variance);
   void CompareControls(int column, double variance);
 
   const ResolvedProblem& problem_;
@@ -298,8 +301,5 @@ class RegionalExpansion {
   Vector difference_;  // S
   Vector slope_;       // n
 };
-
-// Returns one line with the parameters, the time, the run and the solver's flag.
-std::string DescribeFailure(const FailedTrajectory& failure, const Prior& prior);
 
 }  // namespace polyest::internal

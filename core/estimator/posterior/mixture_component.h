@@ -106,46 +106,9 @@ class MixtureComponent {
 
   bool adaptive() const { return problem_.problem().expansion.adaptive; }
   bool automatic_order() const { return !problem_.problem().expansion.order; }
-  bool LooksAhead() const;
   // Whether the limit forbids to propagate the record so far again.
   bool IsReplayWithheld() const { return !allowance_.AllowsRecord(taken_); }
-  absl::Status Recover(const Stop& stop);
-  absl::Status ReadBlock(int64_t rows, RowBlock& block, const Stop& stop);
-  absl::Status BeginRun(int run, const Stop& stop);
-  absl::Status BeginRunAlone(int run, const Stop& stop);
-  absl::Status ReplayAs(ResolvedProblem problem, ExpansionDesign design, LearnedNoise noise,
-                        Matrix particles, const Stop& stop);
-  absl::Status GoOnWith(ResolvedProblem next, const GermSummary& shared, const Stop& stop);
-  absl::StatusOr<Matrix> ParticlesNow(const Stop& stop) const;
-  std::optional<GermSummary> GaussianPosterior(const Stop& stop) const;
-  absl::StatusOr<int64_t> EliminateLast(const GermSummary& posterior, const Stop& stop,
-                                        EndedRuns& ended) const;
-  absl::StatusOr<int64_t> EliminateAll(const Matrix& particles, int64_t rows, const Stop& stop,
-                                       EndedRuns& ended) const;
-  absl::Status RenewEndedRuns(const Stop& stop);
-  absl::StatusOr<bool> AbsorbBlock(const RowBlock& block, const Stop& stop);
-  absl::StatusOr<bool> FinishRow(const Stop& stop);
-  absl::StatusOr<bool> RefineBefore(int row, const Stop& stop);
-  absl::StatusOr<bool> EndWindow(const Stop& stop);
-  absl::Status WithdrawTempering(const Stop& stop);
-  absl::StatusOr<bool> MoveWithMisfit(const Stop& stop);
-  absl::StatusOr<bool> RestoreAccuracy(const Stop& stop);
-  absl::StatusOr<bool> MoveWhileInaccurate(const Stop& stop);
-  absl::StatusOr<bool> RaiseUnlearnedScales(const RowBlock& block, int row, const Stop& stop);
-  absl::StatusOr<bool> LearnNoise(const Stop& stop);
-  double ShiftOfControls() const;
-  double ToleranceForControls(double shift) const;
-  absl::StatusOr<std::unique_ptr<RegionalExpansion>> WithNewTolerance(double shift,
-                                                                      const Stop& stop);
-  absl::StatusOr<std::unique_ptr<RegionalExpansion>> RescaledTo(LearnedNoise noise,
-                                                                const Stop& stop);
-  absl::StatusOr<std::unique_ptr<RegionalExpansion>> ReplayedWith(const LearnedNoise& noise,
-                                                                  const Stop& stop);
-  absl::StatusOr<bool> TightenTolerance(const Stop& stop);
-  absl::StatusOr<bool> MoveToPosterior(const Stop& stop, bool may_raise_order,
-                                       bool may_replay = true);
-  SettlementRequest RequestSettlement() const;
-  bool Take(Settlement settlement);
+
   // The progress of what is due after the last row taken. It outlives a stop, so that the work goes
   // on where it was left: a settlement made once more would change the estimate.
   struct RowEnd {
@@ -158,11 +121,62 @@ class MixtureComponent {
     int settlements = 0;                 // of RestoreAccuracy that have moved the expansion
     bool moved = false;                  // whether MoveWithMisfit has moved the expansion
   };
-  double CoarseResidual() const;
-  bool ReviseMisfit(const Stop& stop);
+
+  // Rows: reading and absorbing them, and what is due before and after one.
+  absl::Status Recover(const Stop& stop);
+  absl::Status ReadBlock(int64_t rows, RowBlock& block, const Stop& stop);
+  absl::StatusOr<bool> AbsorbBlock(const RowBlock& block, const Stop& stop);
+  absl::StatusOr<bool> RefineBefore(int row, const Stop& stop);
+  absl::StatusOr<bool> FinishRow(const Stop& stop);
+  absl::StatusOr<bool> EndWindow(const Stop& stop);
+
+  // Moves of the expansion, each for a reason of its own.
+  bool LooksAhead() const;
   bool Leans() const;
   absl::StatusOr<bool> MoveIfLeaning(const Stop& stop);
   absl::StatusOr<bool> MoveAheadOfNeed(const Stop& stop);
+  absl::StatusOr<bool> RestoreAccuracy(const Stop& stop);
+  absl::StatusOr<bool> MoveWhileInaccurate(const Stop& stop);
+  absl::StatusOr<bool> MoveToPosterior(const Stop& stop, bool may_raise_order,
+                                       bool may_replay = true);
+  SettlementRequest RequestSettlement() const;
+  bool Take(Settlement settlement);
+  void Adopt(std::unique_ptr<RegionalExpansion> expansion);
+
+  // Noise, misfit and the integrators' tolerance (component_noise.cc).
+  double CoarseResidual() const;
+  bool ReviseMisfit(const Stop& stop);
+  absl::StatusOr<bool> MoveWithMisfit(const Stop& stop);
+  absl::Status WithdrawTempering(const Stop& stop);
+  absl::StatusOr<bool> RaiseUnlearnedScales(const RowBlock& block, int row, const Stop& stop);
+  absl::StatusOr<bool> LearnNoise(const Stop& stop);
+  absl::StatusOr<bool> Reweigh(LearnedNoise noise, const Stop& stop);
+  absl::StatusOr<std::unique_ptr<RegionalExpansion>> RescaledTo(LearnedNoise noise,
+                                                                const Stop& stop);
+  absl::StatusOr<std::unique_ptr<RegionalExpansion>> ReplayedWith(const LearnedNoise& noise,
+                                                                  const Stop& stop);
+  absl::StatusOr<bool> TightenTolerance(const Stop& stop);
+  double ShiftOfControls() const;
+  double ToleranceForControls(double shift) const;
+  absl::StatusOr<std::unique_ptr<RegionalExpansion>> WithNewTolerance(double shift,
+                                                                      const Stop& stop);
+
+  // Runs with parameters of their own, and the elimination of those that have ended
+  // (component_runs.cc).
+  absl::Status BeginRun(int run, const Stop& stop);
+  absl::Status BeginRunAlone(int run, const Stop& stop);
+  absl::Status ReplayAs(ResolvedProblem problem, ExpansionDesign design, LearnedNoise noise,
+                        Matrix particles, const Stop& stop);
+  absl::Status GoOnWith(ResolvedProblem next, const GermSummary& shared, const Stop& stop);
+  absl::StatusOr<Matrix> ParticlesNow(const Stop& stop) const;
+  std::optional<GermSummary> GaussianPosterior(const Stop& stop) const;
+  absl::StatusOr<int64_t> EliminateLast(const GermSummary& posterior, const Stop& stop,
+                                        EndedRuns& ended) const;
+  absl::StatusOr<int64_t> EliminateAll(const Matrix& particles, int64_t rows, const Stop& stop,
+                                       EndedRuns& ended) const;
+  absl::Status RenewEndedRuns(const Stop& stop);
+
+  // Division into pieces of the posterior or halves of the element (component_division.cc).
   bool MayLookForPieces() const;
   bool DivideIntoPieces(const RegionalExpansion& expansion, const Matrix& particles);
   bool LookForPieces();
@@ -173,8 +187,6 @@ class MixtureComponent {
   absl::Status ExpandOn(const MixtureComponent& parent, const Piece& piece, const Stop& stop);
   absl::Status BeginOn(const MixtureComponent& parent, const Piece& piece, const Stop& stop);
   ExpansionDesign DesignOn(const MixtureComponent& parent, const Piece& piece) const;
-  absl::StatusOr<bool> Reweigh(LearnedNoise noise, const Stop& stop);
-  void Adopt(std::unique_ptr<RegionalExpansion> expansion);
 
   ResolvedProblem problem_;  // own copy, because the tolerance follows the noise
   const SampleStore* store_;
