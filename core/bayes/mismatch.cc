@@ -119,7 +119,8 @@ struct Mismatch::Sums {
   Vector log_variance;
   double log_variance_at_reference = 0;
   std::deque<Channel> others;
-  int64_t count = 0;  // of samples, over all channels
+  std::vector<RobustSamples> kept;  // of channels with outliers while their samples are few
+  int64_t count = 0;                // of samples, over all channels
 };
 
 Mismatch::Mismatch(MismatchSums known) {
@@ -128,11 +129,18 @@ Mismatch::Mismatch(MismatchSums known) {
   sums_ = std::move(sums);
 }
 
-Mismatch::Mismatch(const std::vector<ChannelSums>& channels) {
-  POLYEST_CHECK(!channels.empty());
+Mismatch::Mismatch(const std::vector<ChannelSums>& channels,
+                   const std::vector<RobustSamples>& kept) {
+  POLYEST_CHECK(!channels.empty() && (kept.empty() || kept.size() == channels.size()));
   auto sums = std::make_shared<Sums>(MismatchSums(channels.front().samples.terms()));
-  for (const ChannelSums& channel : channels) {
+  for (size_t c = 0; c < channels.size(); ++c) {
+    const ChannelSums& channel = channels[c];
     sums->count += channel.samples.count();
+    if (!kept.empty() && kept[c].outliers() != OutlierHandling::kNone) {
+      POLYEST_CHECK(channel.IsKnown());
+      sums->kept.push_back(kept[c]);
+      continue;
+    }
     if (!channel.IsKnown()) {
       // Completed before they are copied and read, by several threads at once.
       channel.samples.Complete();
@@ -165,6 +173,7 @@ double Mismatch::Evaluate(const ConstVectorRef& d) const {
     value +=
         polyest::internal::Evaluate(channel.sums, channel.samples.ChiSquared(d), differences).value;
   }
+  for (const RobustSamples& samples : sums.kept) value += samples.Evaluate(d);
   return value;
 }
 
@@ -195,6 +204,9 @@ double Mismatch::EvaluateWithGradient(const ConstVectorRef& d, VectorRef gradien
     gradient += l.by_a * by_samples;
     if (correlation_unknown) gradient += l.by_d * by_differences;
   }
+  for (const RobustSamples& samples : sums.kept) {
+    value += samples.EvaluateAddingGradient(d, gradient);
+  }
   return value;
 }
 
@@ -204,6 +216,7 @@ Matrix Mismatch::Curvature(const ConstVectorRef& d, const ConstMatrixRef& phi_gr
   const Eigen::Index n = phi_gradient.cols();
   Matrix curvature = Matrix::Zero(n, n);
   if (sums.has_known()) curvature = sums.factored_known.Information(phi_gradient);
+  for (const RobustSamples& samples : sums.kept) curvature += samples.Curvature(d, phi_gradient);
   const double factor =
       std::max(0.1, 1 - spent / static_cast<double>(std::max<int64_t>(1, sums.count)));
   Vector gradient(d.size());
@@ -241,6 +254,7 @@ void Mismatch::EvaluateMany(const ConstMatrixRef& differences, Matrix& product,
     values.noalias() += differences * sums.log_variance;
     values.array() += sums.log_variance_at_reference;
   }
+  for (const RobustSamples& samples : sums.kept) samples.AddTo(values, differences, product);
   thread_local Vector a, d;  // kept from call to call, so that a sampler's sweeps do not allocate
   a.resize(values.size());
   d.resize(values.size());

@@ -16,6 +16,9 @@
 // prior for a: ∫ e^{−½ Σ (u_k − a u_{k−1})²} da gives the last two lines. The constants are chosen
 // so that a working noise of the right size gives N/2 in all cases.
 //
+// While a channel with outliers has few samples, −log of their likelihood is taken sample by sample
+// (robust_samples.h) and not from its sums, which hold near one point only.
+//
 // Where the variances S_k of the residuals depend on the germ, as those of a filter's innovations
 // do, ½ Σ log(S_k/R_k) is added; noise is known then.
 //
@@ -25,6 +28,7 @@
 #include <vector>
 
 #include "core/bayes/mismatch_sums.h"
+#include "core/bayes/robust_samples.h"
 #include "core/common/types.h"
 
 namespace polyest::internal {
@@ -70,7 +74,10 @@ class Mismatch {
  public:
   // Takes the sums of channels with known noise.
   Mismatch(MismatchSums sums);  // NOLINT(google-explicit-constructor): the plain case
-  explicit Mismatch(const std::vector<ChannelSums>& channels);
+  // `kept` has an element for each channel or none. Channels whose element handles outliers have
+  // known noise, and their likelihood is that of these samples in place of the sums.
+  explicit Mismatch(const std::vector<ChannelSums>& channels,
+                    const std::vector<RobustSamples>& kept = {});
 
   int terms() const;
 

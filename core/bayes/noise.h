@@ -101,20 +101,57 @@ inline double BoundedDegreesFactor(OutlierHandling outliers) {
   return (1 - share) * InlierDegreesFactor(outliers) + share * OutlierDegrees(outliers);
 }
 
-// Returns −log of the density behind the weight minus ½ OutlierWeight(u) u², at u and up to a
-// constant. For the t density −log is ½ (ν + 1) log(1 + u²/ν), for Huber's k |u| − ½ k² where |u| >
-// k and ½ u² elsewhere.
-inline double LackOfWeight(OutlierHandling outliers, double u) {
+// Returns −log of the density behind the weight, ρ with ρ′(u) = OutlierWeight(u) u, up to a
+// constant: ½ (ν + 1) log(1 + u²/ν) for Student's t, k |u| − ½ k² for Huber where |u| > k and ½ u²
+// elsewhere.
+inline double RobustLoss(OutlierHandling outliers, double u) {
+  switch (outliers) {
+    case OutlierHandling::kNone:
+      return 0.5 * u * u;
+    case OutlierHandling::kStudentT:
+      return 0.5 * (kStudentTDegreesOfFreedom + 1) * std::log1p(u * u / kStudentTDegreesOfFreedom);
+    case OutlierHandling::kHuber: {
+      const double inner = std::min(std::abs(u), kHuberThreshold);
+      return inner * (std::abs(u) - 0.5 * inner);
+    }
+  }
+  return 0.5 * u * u;
+}
+
+// Returns ρ″(u), which is below 0 for Student's t where u² > ν.
+inline double RobustCurvature(OutlierHandling outliers, double u) {
+  switch (outliers) {
+    case OutlierHandling::kNone:
+      return 1;
+    case OutlierHandling::kStudentT: {
+      const double sum = kStudentTDegreesOfFreedom + u * u;
+      const double difference = kStudentTDegreesOfFreedom - u * u;
+      return (kStudentTDegreesOfFreedom + 1) * (difference / sum) / sum;
+    }
+    case OutlierHandling::kHuber:
+      return std::abs(u) > kHuberThreshold ? 0 : 1;
+  }
+  return 1;
+}
+
+// Returns −log of the density at 0 less that of the normal density: what ρ(u) + ½ log 2π lacks to
+// be −log of the density.
+inline double LackOfDensity(OutlierHandling outliers) {
   switch (outliers) {
     case OutlierHandling::kNone:
       return 0;
     case OutlierHandling::kStudentT:
-      return 0.5 * (kStudentTDegreesOfFreedom + 1) * std::log1p(u * u / kStudentTDegreesOfFreedom) -
-             0.5 * OutlierWeight(outliers, u) * u * u;
+      return 0.0618907198;  // −log(3/8 · √(2π))
     case OutlierHandling::kHuber:
-      return 0.5 * kHuberThreshold * std::max(0.0, std::abs(u) - kHuberThreshold);
+      return 0.0596596614;  // log ∫ e^{−ρ(u)} du/√(2π)
   }
   return 0;
+}
+
+// Returns −log of the density behind the weight minus ½ OutlierWeight(u) u², at u and up to a
+// constant.
+inline double LackOfWeight(OutlierHandling outliers, double u) {
+  return RobustLoss(outliers, u) - 0.5 * OutlierWeight(outliers, u) * u * u;
 }
 
 // Where filters take the samples (core/propagation/heavy_tail.h), Student's t is not weighed but
@@ -123,8 +160,6 @@ inline double LackOfWeight(OutlierHandling outliers, double u) {
 
 // E[w²] = (ν + 1) (ψ(½ν + ½) − ψ(½ν)) for noise of this kind.
 inline constexpr double kFilteredDegreesFactor = 1.4018615;
-// −log of its density at 0 less that of the normal density.
-inline constexpr double kFilteredLack = 0.0618907;
 
 // Returns the weight that a sample would have.
 inline double FilteredOutlierWeight(double w) {

@@ -108,6 +108,12 @@ void serialize(Archive& archive, ChannelSums& sums) {
 }
 
 template <class Archive>
+void serialize(Archive& archive, SampleBySample& few) {
+  archive(few.channels, few.own_error, few.log_noise, few.log_variance, few.check_chi_squared,
+          few.check_residual, few.point_chi_squared);
+}
+
+template <class Archive>
 void serialize(Archive& archive, AbsorbedRows& absorbed) {
   archive(absorbed.rows, absorbed.samples, absorbed.propagated, absorbed.sums, absorbed.discount,
           absorbed.own_error, absorbed.log_noise, absorbed.log_variance, absorbed.outliers,
@@ -115,7 +121,7 @@ void serialize(Archive& archive, AbsorbedRows& absorbed) {
           absorbed.check_chi_squared, absorbed.check_residual, absorbed.check_valid,
           absorbed.point_chi_squared, absorbed.windows, absorbed.profiles, absorbed.blocks,
           absorbed.largest, absorbed.control_scores, absorbed.control_valid,
-          absorbed.point_log_variance, absorbed.carried_error, absorbed.carried_rate);
+          absorbed.point_log_variance, absorbed.carried_error, absorbed.carried_rate, absorbed.few);
 }
 
 template <class Archive>

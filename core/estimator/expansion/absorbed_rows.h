@@ -3,15 +3,29 @@
 // What an expansion keeps of the rows that it has absorbed.
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "core/bayes/mismatch.h"
+#include "core/bayes/robust_samples.h"
 #include "core/bayes/window_sums.h"
 #include "core/common/types.h"
 #include "core/estimator/record/correlation_profile.h"
 #include "core/estimator/record/residual_blocks.h"
 
 namespace polyest::internal {
+
+// While channels with outliers have few samples: these, and what AbsorbedRows has under the same
+// names, with their likelihood in place of that of weighted samples (bayes/robust_samples.h). Other
+// channels have the same in both.
+struct SampleBySample {
+  std::vector<RobustSamples> channels;  // per channel; those that keep none have no outliers
+  double own_error = 0;
+  double log_noise = 0, log_variance = 0;
+  Matrix check_chi_squared;  // C × m; for a channel whose samples are kept 2 Σ ρ, as below
+  Vector check_residual;
+  Matrix point_chi_squared;  // Q × m
+};
 
 // The accumulated contributions of the rows that an expansion has absorbed.
 struct AbsorbedRows {
@@ -51,6 +65,9 @@ struct AbsorbedRows {
   Vector point_log_variance;        // Q: ½ Σ log(S/σ²) with filters, discounted; empty without
   Matrix control_scores;            // S × (K · m), column i · m + c (control_trajectories.h)
   std::vector<bool> control_valid;  // whether the trajectory could be integrated; K
+  // What counts in place of the above; nothing without outliers, or from where their samples are
+  // no longer few.
+  std::optional<SampleBySample> few;
 };
 
 }  // namespace polyest::internal

@@ -98,7 +98,27 @@ class Substitution {
       absorbed.check_chi_squared.col(c) = chi_squared.tail(checks);
     }
     SetControlScores(absorbed);
+    if (absorbed.few) Carry(absorbed, points, error);
     return absorbed;
+  }
+
+  // Carries the samples over that are kept by themselves. Other channels are as in the sums.
+  void Carry(AbsorbedRows& absorbed, Eigen::Index points, double error) const {
+    SampleBySample& few = *absorbed.few;
+    few.own_error = error;
+    few.check_residual = absorbed.check_residual;
+    few.point_chi_squared = absorbed.point_chi_squared;
+    few.check_chi_squared = absorbed.check_chi_squared;
+    Matrix product;
+    for (Eigen::Index c = 0; c < channels(); ++c) {
+      RobustSamples& samples = few.channels[static_cast<size_t>(c)];
+      samples = samples.Substituted(transfer_, shift_);
+      if (samples.outliers() == OutlierHandling::kNone) continue;
+      Vector losses = Vector::Zero(new_phi_.rows());
+      samples.AddTo(losses, new_phi_, product);
+      few.point_chi_squared.col(c) = 2 * losses.head(points);
+      few.check_chi_squared.col(c) = 2 * losses.tail(losses.size() - points);
+    }
   }
 
   // Replaces the terms of ½ Σ log(S/σ²) = lᵀφ by l′ = T l and returns its values at the new points.

@@ -138,6 +138,14 @@ void RegionalExpansion::Compare(int column, double z, double variance) {
   }
 }
 
+RegionalExpansion::Check RegionalExpansion::Checks() const {
+  const double samples = std::max<double>(1, static_cast<double>(absorbed_.samples));
+  const std::optional<SampleBySample>& few = absorbed_.few;
+  const Vector& residual = few ? few->check_residual : absorbed_.check_residual;
+  return {few ? few->check_chi_squared : absorbed_.check_chi_squared,
+          (residual / samples).cwiseSqrt(), absorbed_.check_valid, absorbed_.samples};
+}
+
 // Adds c_k δ_k/R_k of one sample.
 void RegionalExpansion::CompareControls(int column, double variance) {
   const int channel = column % channels_;

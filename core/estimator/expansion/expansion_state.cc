@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <optional>
 #include <utility>
 
 #include "core/common/infeasible.h"
@@ -80,6 +81,24 @@ bool AreSums(const MismatchSums& sums, int terms) {
          sums.count() >= 0;
 }
 
+// Samples that are kept may have been given up since the beginning, but not the other way.
+bool AreOfFew(const std::optional<SampleBySample>& state,
+              const std::optional<SampleBySample>& fresh, int terms) {
+  if (!state) return true;
+  if (!fresh || state->channels.size() != fresh->channels.size()) return false;
+  for (size_t c = 0; c < fresh->channels.size(); ++c) {
+    const RobustSamples& samples = state->channels[c];
+    if (samples.outliers() != fresh->channels[c].outliers() || !samples.IsValid(terms))
+      return false;
+  }
+  return state->check_chi_squared.rows() == fresh->check_chi_squared.rows() &&
+         state->check_chi_squared.cols() == fresh->check_chi_squared.cols() &&
+         state->check_residual.size() == fresh->check_residual.size() &&
+         state->point_chi_squared.rows() == fresh->point_chi_squared.rows() &&
+         state->point_chi_squared.cols() == fresh->point_chi_squared.cols() &&
+         state->own_error >= 0 && std::isfinite(state->own_error);
+}
+
 // Values accumulated at the check points may be infinite, since a trajectory may diverge.
 bool HasSizesOf(const AbsorbedRows& state, const AbsorbedRows& fresh, bool has_windows) {
   const auto terms = static_cast<int>(fresh.previous_coefficients.rows());
@@ -115,7 +134,7 @@ bool HasSizesOf(const AbsorbedRows& state, const AbsorbedRows& fresh, bool has_w
          state.samples >= 0 && state.propagated >= 0 && state.own_error >= 0 &&
          std::isfinite(state.own_error) && state.carried_error >= 0 &&
          std::isfinite(state.carried_error) && state.carried_rate >= 0 &&
-         std::isfinite(state.carried_rate);
+         std::isfinite(state.carried_rate) && AreOfFew(state.few, fresh.few, terms);
 }
 
 bool IsAscendingBelow(const std::vector<int>& numbers, int end) {

@@ -88,6 +88,7 @@ RegionalExpansion::RegionalExpansion(const ResolvedProblem& problem, const Sampl
   LookFromPosterior();
   Linearize();
   TakeEndedRuns();
+  KeepFewSamples();
 }
 
 // Sets how the sums of each channel become a likelihood.
@@ -305,7 +306,8 @@ void RegionalExpansion::AbsorbSample(int row, int c) {
   const double weight = OutlierWeight(outliers, deviation);
   // e = z − cᵀφ_0,  R = σ²/w + ρ
   double noise = VarianceFactor(outliers) * sigma * sigma / weight;
-  double lack = filters_ && IsTailed(c) ? kFilteredLack : LackOfWeight(outliers, deviation);
+  double lack =
+      filters_ && IsTailed(c) ? LackOfDensity(model.outliers) : LackOfWeight(outliers, deviation);
   if (IsScored(c)) {
     const ScoredSample scored = Scored(c, coefficients, z, noise, own_error);
     z = scored.value;
@@ -325,6 +327,7 @@ void RegionalExpansion::AbsorbSample(int row, int c) {
   CountOutlier(c, coefficients, z, variance, deviation);
   Compare(column, z, noise);
   CompareControls(column, variance);
+  if (absorbed_.few) AddToFew(c, column, z, noise, lack);
   if (filters_) AddLogVariance(column, noise, variance);
   // χ²_q += (z − y_q)²/R
   absorbed_.point_chi_squared.col(c).array() +=
@@ -365,7 +368,9 @@ void RegionalExpansion::AddDifference(int channel, const ConstVectorRef& coeffic
 }
 
 Cost RegionalExpansion::MakeCost(double regularization) const {
-  Cost cost(design_.basis, design_.region, design_.reference, Mismatch(absorbed_.sums),
+  const std::optional<SampleBySample>& few = absorbed_.few;
+  Cost cost(design_.basis, design_.region, design_.reference,
+            few ? Mismatch(absorbed_.sums, few->channels) : Mismatch(absorbed_.sums),
             problem_.prior(), regularization, WithinKnown(problem_, design_.element));
   cost.set_power(1 / noise_.misfit);
   cost.set_threads(threads_);
@@ -375,12 +380,6 @@ Cost RegionalExpansion::MakeCost(double regularization) const {
     cost.set_population(PopulationCostOf(problem_));
   }
   return cost;
-}
-
-RegionalExpansion::Check RegionalExpansion::Checks() const {
-  const double samples = std::max<double>(1, static_cast<double>(absorbed_.samples));
-  return {absorbed_.check_chi_squared, (absorbed_.check_residual / samples).cwiseSqrt(),
-          absorbed_.check_valid, absorbed_.samples};
 }
 
 }  // namespace polyest::internal

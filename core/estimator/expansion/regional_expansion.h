@@ -10,6 +10,8 @@
 // is ρ, because it is then small beside the residuals. The noise is the noise learned so far
 // (learned_noise.h). Correlated samples are whitened first. Outliers lose weight according to their
 // residual at the posterior's centre, compared with the noise and the posterior's own spread there.
+// While they are few, the samples of channels with outliers and known noise are kept besides, and
+// their likelihood is that of each sample (bayes/robust_samples.h).
 //
 // Where the likelihood is that of prediction errors (polyest/problem.h), each point runs a filter
 // (propagation/filter_bank.h), and what is expanded is the whitened innovation w = ν/√S and
@@ -125,7 +127,7 @@ class RegionalExpansion {
   // Returns the number of a channel's samples lost to the expansion's own error.
   double Discount(int channel) const { return absorbed_.discount[channel]; }
   // Returns the sum of the squares of the expansion's own error in units of the noise, Σ ρ_k/R_k.
-  double OwnError() const { return absorbed_.own_error; }
+  double OwnError() const { return absorbed_.few ? absorbed_.few->own_error : absorbed_.own_error; }
   // Returns the part of OwnError() that the check points' own trajectories do not show, because it
   // was taken over from an expansion over another region.
   double CarriedError() const { return absorbed_.carried_error; }
@@ -147,15 +149,21 @@ class RegionalExpansion {
   const Vector& LinearizedAt() const { return linearized_at_; }  // η, n
   // Returns the number of samples of a channel that have less than half their weight.
   int64_t Outliers(int channel) const { return absorbed_.outliers[static_cast<size_t>(channel)]; }
+  // Returns the samples of a channel with outliers while they are kept; null without any.
+  const RobustSamples* KeptSamples(int channel) const;
   // Returns the term that makes the costs of different expansions of the same record comparable,
   // each with its own noise and outlier weights: Σ ½ log R_k, and what the reweighting leaves out
   // of the likelihood. R is taken with the expansion's own error, as in the sums, or without it.
   double LogNormalization(bool with_own_error) const {
-    return with_own_error ? absorbed_.log_variance : absorbed_.log_noise;
+    if (!absorbed_.few) return with_own_error ? absorbed_.log_variance : absorbed_.log_noise;
+    return with_own_error ? absorbed_.few->log_variance : absorbed_.few->log_noise;
   }
   // Returns χ² of the model itself at the collocation points, Q × m: what the sums say of the
-  // expansion there. Not finite where a trajectory could not be integrated.
-  const Matrix& PointChiSquared() const { return absorbed_.point_chi_squared; }
+  // expansion there, or 2 Σ ρ of samples that are kept. Not finite where a trajectory could not be
+  // integrated.
+  const Matrix& PointChiSquared() const {
+    return absorbed_.few ? absorbed_.few->point_chi_squared : absorbed_.point_chi_squared;
+  }
   // Returns the cost on this expansion with α² = regularization and the likelihood to the power
   // 1/misfit.
   Cost MakeCost(double regularization) const;
@@ -225,6 +233,9 @@ class RegionalExpansion {
                              double variance) const;
   void CountOutlier(int channel, const ConstVectorRef& coefficients, double z, double variance,
                     double deviation);
+  void KeepFewSamples();
+  int64_t MostKeptSamples() const;
+  void AddToFew(int channel, int column, double z, double noise, double lack);
 
   // The sums of the samples, begun with those of ended runs (ended_runs_sums.cc).
   void BeginSums();

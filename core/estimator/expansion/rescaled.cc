@@ -48,7 +48,22 @@ std::optional<Vector> VarianceFactors(const ResolvedProblem& problem,
   return factors;
 }
 
+// Divides what belongs to samples that are kept by themselves, whose own noise stays as it is.
+void Divide(const Vector& factors, const AbsorbedRows& absorbed, SampleBySample& few) {
+  const double least = factors.minCoeff();
+  few.own_error /= least;
+  few.check_residual /= least;
+  for (Eigen::Index c = 0; c < factors.size(); ++c) {
+    few.check_chi_squared.col(c) /= factors[c];
+    few.point_chi_squared.col(c) /= factors[c];
+    const auto samples = static_cast<double>(absorbed.sums[static_cast<size_t>(c)].samples.count());
+    few.log_noise += 0.5 * samples * std::log(factors[c]);
+    few.log_variance += 0.5 * samples * std::log(factors[c]);
+  }
+}
+
 void Divide(const Vector& factors, AbsorbedRows& absorbed) {
+  if (absorbed.few) Divide(factors, absorbed, *absorbed.few);
   const double least = factors.minCoeff();
   absorbed.own_error /= least;
   absorbed.carried_error /= least;
