@@ -56,22 +56,45 @@ void DescribeSums(const AssessmentRequest& request, const Vector& eta, const Vec
   channel.residual_sums = blocks.count();
 }
 
+// What of a channel's χ² belongs to outliers, in the units of its sums.
+struct Outliers {
+  int64_t count = 0;
+  double chi_squared = 0;  // of all samples
+  double of_outliers = 0;
+};
+
+// Returns the outliers at the estimate if the samples are kept, or else as they were when they got
+// their weights. `chi_squared` is that of the sums at d, for the noise as it is taken to be.
+Outliers OutliersAt(const RegionalExpansion& expansion, OutlierHandling handling, const Vector& d,
+                    int c, double chi_squared) {
+  if (const RobustSamples* kept = expansion.KeptSamples(c)) {
+    const RobustSamples::Judgement judged = kept->JudgedAt(d);
+    const double unit = VarianceFactor(handling);
+    return {judged.outliers, judged.chi_squared / unit, judged.of_outliers / unit};
+  }
+  const int64_t count = expansion.Outliers(c);
+  const ChannelSums& sums = expansion.sums()[static_cast<size_t>(c)];
+  return {count, chi_squared, sums.surplus + OutlierDegrees(handling) * static_cast<double>(count)};
+}
+
 // Returns χ² in units in which N is expected. Outliers count as one each, as long as they may be
-// gross errors, of which neither model nor noise knows; else for what they are. `chi_squared` is
-// that of the sums for the noise as it is taken to be, `used` the degrees of freedom used up.
-double JudgedChiSquared(const AssessmentRequest& request, int c, double chi_squared, double used) {
+// gross errors, of which neither model nor noise knows; else for what they are. `used` are the
+// degrees of freedom used up.
+double JudgedChiSquared(const AssessmentRequest& request, int c, const Outliers& found,
+                        double used) {
   const ChannelSums& sums = request.expansion->sums()[static_cast<size_t>(c)];
   const OutlierHandling handling =
       request.problem->problem().measured[static_cast<size_t>(c)].noise.outliers;
   const bool weighted = handling != OutlierHandling::kNone && !request.problem->uses_filters();
-  if (!weighted || sums.scale_unknown) return (chi_squared - sums.surplus) / sums.degrees_factor;
-  const auto outliers = static_cast<double>(request.expansion->Outliers(c));
-  const double samples = static_cast<double>(sums.samples.count());
-  const double of_outliers = sums.surplus + OutlierDegrees(handling) * outliers;
-  const double others = (chi_squared - of_outliers) / InlierDegreesFactor(handling);
+  if (!weighted || sums.scale_unknown) {
+    return (found.chi_squared - sums.surplus) / sums.degrees_factor;
+  }
+  const auto outliers = static_cast<double>(found.count);
+  const auto samples = static_cast<double>(sums.samples.count());
+  const double others = (found.chi_squared - found.of_outliers) / InlierDegreesFactor(handling);
   return MayBeGrossErrors(handling, outliers / samples, others, samples - outliers - used)
              ? others + outliers
-             : chi_squared / DegreesFactor(handling);
+             : found.chi_squared / DegreesFactor(handling);
 }
 
 void DescribeChannel(const AssessmentRequest& request, const Cost& cost, const Vector& eta,
@@ -91,14 +114,17 @@ void DescribeChannel(const AssessmentRequest& request, const Cost& cost, const V
   channel.noise_std_dev = std::sqrt(mean_square) * noise.scale * summary.RootMeanSquareNoise();
   const double share =
       fitted * samples / static_cast<double>(request.record->samples()) + sums.spent;
-  channel.chi_squared =
-      JudgedChiSquared(request, c, sums.samples.ChiSquared(d) / mean_square, share);
+  const OutlierHandling handling =
+      request.problem->problem().measured[static_cast<size_t>(c)].noise.outliers;
+  const Outliers outliers =
+      OutliersAt(*request.expansion, handling, d, c, sums.samples.ChiSquared(d) / mean_square);
+  channel.chi_squared = JudgedChiSquared(request, c, outliers, share);
   channel.lag1_correlation =
       std::clamp(sums.Lag1Correlation(d) + Lag1Correction(share, samples), -1.0, 1.0);
   DescribeSums(request, eta, d, c, channel);
   channel.noise_time_constant_s = noise.time_constant_s;
   channel.noise_white_share = noise.white_share;
-  channel.outliers = request.expansion->Outliers(c);
+  channel.outliers = outliers.count;
   channel.effective_samples =
       samples * (noise.time_constant_s > 0
                      ? IndependentShare(request.record->beginning(), c, noise.shape())
