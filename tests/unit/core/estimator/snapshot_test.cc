@@ -151,6 +151,13 @@ TEST(Snapshot, HoldsTheSampleBeforeOfCorrelatedNoise) {
   ExpectSameBitsThroughRestarts(problem, samples);
 }
 
+// The samples are kept one by one at the first two checkpoints and given up before the third.
+TEST(Snapshot, HoldsFewSamplesWithOutliers) {
+  Problem problem = OscillatorProblem();
+  problem.measured[0].noise.outliers = OutlierHandling::kStudentT;
+  ExpectSameBitsThroughRestarts(problem, OscillatorRecord());
+}
+
 TEST(Snapshot, HoldsTheStatesOfFilters) {
   Problem problem = OscillatorProblem();
   problem.process_noise = {{.state = "v", .spectral_density = 1e-3}};
