@@ -19,8 +19,10 @@ enum class NoiseCorrelation {
 };
 
 // What is done about gross errors: a sample's noise variance is divided by a weight, a function of
-// its residual u in units of the noise. With LikelihoodForm::kPredictionError kStudentT is the
-// noise's own distribution, t with 4 degrees of freedom scaled by σ, and kHuber is not available.
+// its residual u in units of the noise. While the samples of known noise are few (64, or 8 for each
+// parameter), the density behind the weight is their likelihood instead. With
+// LikelihoodForm::kPredictionError kStudentT is the noise's own distribution, t with 4 degrees of
+// freedom scaled by σ, and kHuber is not available.
 enum class OutlierHandling {
   kNone,      // the weight is 1
   kStudentT,  // (ν + 1)/(ν + u²), ν = 4: gross errors have almost no influence
