@@ -53,7 +53,7 @@ const RobustSamples* RegionalExpansion::KeptSamples(int channel) const {
   return samples.outliers() == OutlierHandling::kNone ? nullptr : &samples;
 }
 
-int64_t RegionalExpansion::MostKeptSamples() const {
+int64_t RegionalExpansion::MaxKeptSamples() const {
   return std::max<int64_t>(kMostKept, kMostKeptPerParameter * problem_.dimension());
 }
 
@@ -111,7 +111,7 @@ void RegionalExpansion::AddToFew(int channel, int column, double z, double noise
   const int64_t count = std::accumulate(
       few.channels.begin(), few.channels.end(), int64_t{0},
       [](int64_t sum, const RobustSamples& samples) { return sum + samples.count(); });
-  if (count > MostKeptSamples()) absorbed_.few.reset();
+  if (count > MaxKeptSamples()) absorbed_.few.reset();
 }
 
 }  // namespace polyest::internal

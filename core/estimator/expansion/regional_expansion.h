@@ -234,7 +234,7 @@ class RegionalExpansion {
   void CountOutlier(int channel, const ConstVectorRef& coefficients, double z, double variance,
                     double deviation);
   void KeepFewSamples();
-  int64_t MostKeptSamples() const;
+  int64_t MaxKeptSamples() const;
   void AddToFew(int channel, int column, double z, double noise, double lack);
 
   // The sums of the samples, begun with those of ended runs (ended_runs_sums.cc).
