@@ -14,8 +14,8 @@ constexpr double kMinEffectiveChecks = 2;  // for the spread over them to be mea
 constexpr double kMaxSpreadOfMean =
     0.25;  // standard deviation of ΔJ at which its mean counts as known
 constexpr double kNegligibleWeight = 1e-3;  // weight of a check point relative to the heaviest
-// The check points no longer represent the posterior when the nearest one is so many standard
-// deviations beyond √n away from its mode.
+// Where residuals are correlated, check points represent the posterior only if the nearest one is
+// at most so many standard deviations beyond √n away from its mode.
 constexpr double kReachOfChecks = 2;
 constexpr double kMaxLag1Correlation = 0.99;
 
@@ -24,13 +24,16 @@ Minimum MinimumOf(const ExpansionDesign& design, const Cost& cost) {
   return FindMinimaOf(cost, SearchOf(cost, design), start, Stop()).front();
 }
 
-// Returns √((1 + r)/(1 − r)) with the largest lag-1 correlation r ≥ 0 of a channel's residuals at
-// d.
+// Returns √((1 + r)/(1 − r)) with the largest lag-1 correlation r of a channel's residuals at d
+// that is more than chance: N independent residuals have one of 2/√N or less, as a rule.
 double GainByCorrelation(const RegionalExpansion& expansion, const Vector& d) {
-  double r = 0;
-  for (const ChannelSums& sums : expansion.sums()) r = std::max(r, sums.Lag1Correlation(d));
-  r = std::min(r, kMaxLag1Correlation);
-  return std::sqrt((1 + r) / (1 - r));
+  double largest = 0;
+  for (const ChannelSums& sums : expansion.sums()) {
+    const double r = sums.Lag1Correlation(d);
+    const double chance = 2 / std::sqrt(static_cast<double>(sums.samples.count()));
+    if (r > chance) largest = std::max(largest, std::min(r, kMaxLag1Correlation));
+  }
+  return std::sqrt((1 + largest) / (1 - largest));
 }
 
 // What the residuals of the expansion at its check points say of a shift.
@@ -47,6 +50,7 @@ ShiftOfResiduals BoundByResiduals(const RegionalExpansion& expansion, const Cost
   if (!(norm > kNegligibleShift)) return {norm + of_variances, true};  // the rest costs a search
   const Minimum minimum = MinimumOf(expansion.design(), cost);
   const double gain = GainByCorrelation(expansion, cost.BasisDifference(minimum.point));
+  if (!(gain > 1)) return {norm + of_variances, true};
   const double nearest = std::sqrt(2 * std::max(0.0, checks.totals.minCoeff() - minimum.value));
   return {gain * norm + of_variances, nearest <= std::sqrt(cost.dimension()) + kReachOfChecks};
 }

@@ -37,15 +37,15 @@ CheckDifferences DifferencesAtChecks(const RegionalExpansion& expansion, const C
 //   the standard deviation over the posterior of ΔJ = J_mismatch of the model − of the expansion
 //   (at the expansion's lag-1 correlation, where that enters; times the power of the likelihood),
 //   ‖(model − expansion)/σ‖ √((1 + r)/(1 − r)) over the samples, r the lag-1 correlation of the
-//   residuals at the minimum of the cost; of the fit itself if there are no check points; with
-//   filters, plus the error of ½ Σ log(S/σ²).
+//   residuals at the minimum of the cost if that is more than chance; of the fit itself if there
+//   are no check points; with filters, plus the error of ½ Σ log(S/σ²).
 // Both bounds follow from the Cauchy–Schwarz inequality, over particles and over samples. The first
-// is sharper but needs check points where the posterior is, also within √n + 2 standard deviations
-// of its mode. The second holds wherever they are. Its factor counts where residuals are not noise
-// but a misfit, which may look like the error of the expansion: N samples then tell no more than
-// N (1 − r)/(1 + r) independent ones. Of sums taken over from an expansion over another region, the
-// check points know nothing; the first bound is increased by √(β Σ ρ_k/R_k) of those, and the
-// second contains it (carry_over.h).
+// is sharper but needs check points where the posterior is. The second holds wherever they are. Its
+// factor counts where residuals are not noise but a misfit, which may look like the error of the
+// expansion: N samples then tell no more than N (1 − r)/(1 + r) independent ones. The first bound
+// is then left out unless a check point lies within √n + 2 standard deviations of the mode. Of sums
+// taken over from an expansion over another region, the check points know nothing; the first bound
+// is increased by √(β Σ ρ_k/R_k) of those, and the second contains it (carry_over.h).
 struct Agreement {
   double shift = 0;  // the smaller of the available bounds, ≥ 0
   // Mean of ΔJ over the posterior, if the check points determine it to 0.25: the change of the
