@@ -22,8 +22,16 @@ namespace {
 // Number of columns (output × time) processed at once. It bounds the memory and the time between
 // two checks of the stop request.
 constexpr int64_t kColumnsAtATime = 128;
+constexpr size_t kLeastDraws = 2;  // have a variance
 // As many times of a grid as this are not counted any more.
 constexpr int64_t kMaxCounted = int64_t{1} << 50;
+
+// Draws of the prior that continue the low-discrepancy sequence of the collocation points, so that
+// none of them is one.
+Matrix DrawPrior(const std::vector<Germ>& germs, Eigen::Index points) {
+  const int count = static_cast<int>(points) + kPriorDraws;
+  return CollocationPoints(PointSet::kHalton, germs, 1, count).value().bottomRows(kPriorDraws);
+}
 
 absl::Status CheckNoStreamedInput(const ResolvedProblem& problem) {
   if (problem.streamed_inputs().empty()) return absl::OkStatus();
@@ -153,10 +161,14 @@ PriorExpansion::PriorExpansion(const ResolvedProblem& problem, std::vector<int> 
       basis_(std::move(basis)),
       points_(std::move(points)),
       matrix_(std::move(matrix)),
-      kept_(static_cast<size_t>(points_.rows())),
+      draws_(DrawPrior(prior_.germs(), points_.rows())),
+      kept_points_(static_cast<size_t>(points_.rows())),
+      kept_draws_(static_cast<size_t>(draws_.rows())),
       inputs_(problem.MakeInputs()),
       ensemble_(problem.MakeEnsemble(Thetas(), outputs_, threads), &inputs_) {
-  std::iota(kept_.begin(), kept_.end(), 0);
+  std::iota(kept_points_.begin(), kept_points_.end(), 0);
+  std::iota(kept_draws_.begin(), kept_draws_.end(), this->points());
+  basis_->EvaluateMany(draws_, draw_basis_);
 }
 
 absl::Status PriorExpansion::Run(const TimeGrid& grid,
@@ -165,51 +177,74 @@ absl::Status PriorExpansion::Run(const TimeGrid& grid,
   const auto m = static_cast<int64_t>(outputs_.size());
   const auto expand = [&](int64_t first, const Matrix& values) -> absl::Status {
     POLYEST_RETURN_IF_ERROR(LeaveOutFailed(stop));
-    // c = A⁺ Y (10). A trajectory with an output beyond 1e100 has failed (output_limit.h), so that
-    // squares of c do not overflow.
-    Matrix coefficients(basis_->size(), values.cols());
-    Vector residual_variance(values.cols());
-    matrix_.Solve(values(kept_, Eigen::all), coefficients, residual_variance);
-    visit({first, values.cols() / m, Expansion(basis_, std::move(coefficients)),
-           std::move(residual_variance)});
+    visit(Expand(first, values));
     return absl::OkStatus();
   };
   return PropagateOver(grid, m, ensemble_, expand, stop);
 }
 
+ExpandedOutputs PriorExpansion::Expand(int64_t first, const Matrix& values) {
+  // c = A⁺ Y (10). A trajectory with an output beyond 1e100 has failed (output_limit.h), so that
+  // squares of c do not overflow.
+  Matrix coefficients(basis_->size(), values.cols());
+  Vector fit_variance(values.cols());
+  matrix_.Solve(values(kept_points_, Eigen::all), coefficients, fit_variance);
+  Matrix model = values(kept_draws_, Eigen::all);
+  std::vector<int> rows;  // of draw_basis_
+  for (const int row : kept_draws_) rows.push_back(row - points());
+  const Matrix difference = model - draw_basis_(rows, Eigen::all) * coefficients;
+  Vector variance =
+      difference.colwise().squaredNorm().transpose() / static_cast<double>(rows.size());
+  return {first, values.cols() / static_cast<Eigen::Index>(outputs_.size()),
+          Expansion(basis_, std::move(coefficients)), std::move(model), std::move(variance)};
+}
+
 Matrix PriorExpansion::Thetas() const {
-  Matrix thetas(points_.rows(), points_.cols());
-  for (Eigen::Index q = 0; q < points_.rows(); ++q) {
-    thetas.row(q) = prior_.ToParameters(points_.row(q).transpose()).transpose();
+  Matrix thetas(trajectories(), points_.cols());
+  for (int row = 0; row < trajectories(); ++row) {
+    const Vector xi = row < points() ? points_.row(row) : draws_.row(row - points());
+    thetas.row(row) = prior_.ToParameters(xi).transpose();
   }
   return thetas;
 }
 
-// Leaves failed points out of the fit, beginning with the times of this call of Advance.
+// Leaves failed points out of the fit, and failed draws out of the comparison, beginning with the
+// times of this call of Advance.
 absl::Status PriorExpansion::LeaveOutFailed(const Stop& stop) {
-  if (kept_.size() + failures().size() == static_cast<size_t>(points_.rows())) {
+  if (kept_points_.size() + kept_draws_.size() + failures().size() ==
+      static_cast<size_t>(trajectories())) {
     return absl::OkStatus();
   }
   std::set<int> failed;
   for (const PointFailure& failure : failures()) failed.insert(failure.point);
-  std::erase_if(kept_, [&](int point) { return failed.contains(point); });
-  if (kept_.size() <= static_cast<size_t>(basis_->size())) {
-    const PointFailure& last =
-        *std::max_element(failures().begin(), failures().end(),
-                          [](const auto& a, const auto& b) { return a.time_s < b.time_s; });
-    return absl::FailedPreconditionError(absl::StrFormat(
-        "only %d of %d collocation points could be integrated and an expansion of %d terms needs "
-        "more; at %s the model failed at t = %g s: %s (solver flag %d)",
-        kept_.size(), points_.rows(), basis_->size(), DescribePoint(last.point), last.time_s,
-        last.reason, last.flag));
+  const auto has_failed = [&](int row) { return failed.contains(row); };
+  std::erase_if(kept_draws_, has_failed);
+  if (std::erase_if(kept_points_, has_failed) > 0 || kept_draws_.size() < kLeastDraws) {
+    if (kept_points_.size() <= static_cast<size_t>(basis_->size()) ||
+        kept_draws_.size() < kLeastDraws) {
+      return TooFewLeft();
+    }
+    POLYEST_ASSIGN_OR_RETURN(
+        matrix_, CollocationMatrix::Factor(*basis_, points_(kept_points_, Eigen::all), stop));
   }
-  POLYEST_ASSIGN_OR_RETURN(matrix_,
-                           CollocationMatrix::Factor(*basis_, points_(kept_, Eigen::all), stop));
   return absl::OkStatus();
 }
 
+absl::Status PriorExpansion::TooFewLeft() const {
+  const PointFailure& last =
+      *std::max_element(failures().begin(), failures().end(),
+                        [](const auto& a, const auto& b) { return a.time_s < b.time_s; });
+  return absl::FailedPreconditionError(absl::StrFormat(
+      "only %d of %d collocation points and %d of %d draws of the prior could be integrated and an "
+      "expansion of %d terms needs more points, and at least %d draws; at %s the model failed at t "
+      "= %g s: %s (solver flag %d)",
+      kept_points_.size(), points(), kept_draws_.size(), draws(), basis_->size(), kLeastDraws,
+      DescribePoint(last.point), last.time_s, last.reason, last.flag));
+}
+
 std::string PriorExpansion::DescribePoint(int point) const {
-  const Vector theta = prior_.ToParameters(points_.row(point).transpose());
+  const Vector xi = point < points() ? points_.row(point) : draws_.row(point - points());
+  const Vector theta = prior_.ToParameters(xi);
   std::vector<std::string> values;
   for (int i = 0; i < prior_.dimension(); ++i) {
     values.push_back(

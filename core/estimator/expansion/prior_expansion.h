@@ -3,6 +3,11 @@
 // Expansions of a model's outputs over the whole prior at the times of a grid, y(t_k, ξ) = c_kᵀ
 // φ(ξ) with c_k = A⁺ Y_k, equations (3) to (10). The studies that need no data derive their results
 // from them. This is the paper's fixed expansion: its region does not move.
+//
+// The model itself runs at kPriorDraws further points, too, which are draws of the prior and in no
+// fit. The fit's own residuals cannot tell how wrong the expansion is: with few points to spare
+// they are small by construction, and they end where the points end, while a polynomial grows
+// fastest in the tails that the prior still has beyond them.
 
 #include <absl/functional/function_ref.h>
 #include <absl/status/statusor.h>
@@ -20,6 +25,11 @@
 #include "polyest/stop.h"
 
 namespace polyest::internal {
+
+// The number of draws at which the model is compared with the expansion. A quantile is then off by
+// at most about √(p (1 − p)/512) in probability, and the draws reach to about three standard
+// deviations of each germ.
+inline constexpr int kPriorDraws = 512;
 
 // The times 0, step, 2 step, …, until, in s.
 struct TimeGrid {
@@ -65,9 +75,10 @@ struct ExpandedOutputs {
   int64_t first_time;
   int64_t times;
   Expansion expansion;
-  // Variance of model − expansion at the collocation points, with Q − S degrees of freedom; 0 when
-  // Q = S.
-  Vector residual_variance;
+  // The model at the draws of the prior that could be integrated up to the last of these times,
+  // draws × columns.
+  Matrix model;
+  Vector residual_variance;  // mean square of model − expansion at these draws
 };
 
 class PriorExpansion {
@@ -80,12 +91,15 @@ class PriorExpansion {
 
   const Basis& basis() const { return *basis_; }
   int points() const { return static_cast<int>(points_.rows()); }  // Q
-  // Returns the trajectories that could not be integrated. They are left out of the fit.
+  int draws() const { return static_cast<int>(draws_.rows()); }
+  int trajectories() const { return points() + draws(); }
+  // Returns the trajectories that could not be integrated, of the collocation points (from 0) and
+  // of the draws (from Q). They are left out.
   const std::vector<PointFailure>& failures() const { return ensemble_.failures(); }
 
   // Calls `visit` for successive stretches of times that cover the grid in order. May be called
-  // only once. Returns FailedPrecondition when at most S trajectories are left, or the status of a
-  // stop request.
+  // only once. Returns FailedPrecondition when at most S trajectories of collocation points or
+  // fewer than two of draws are left, or the status of a stop request.
   absl::Status Run(const TimeGrid& grid, absl::FunctionRef<void(const ExpandedOutputs&)> visit,
                    const Stop& stop);
 
@@ -95,7 +109,9 @@ class PriorExpansion {
                  int threads);
 
   Matrix Thetas() const;
+  ExpandedOutputs Expand(int64_t first, const Matrix& values);
   absl::Status LeaveOutFailed(const Stop& stop);
+  absl::Status TooFewLeft() const;
   std::string DescribePoint(int point) const;
 
   const Prior& prior_;
@@ -103,12 +119,16 @@ class PriorExpansion {
   std::shared_ptr<const Basis> basis_;
   Matrix points_;  // Q × n
   CollocationMatrix matrix_;
-  std::vector<int> kept_;  // the points still in the fit
+  Matrix draws_;       // of the prior, draws × n
+  Matrix draw_basis_;  // φ at the draws, draws × S
+  // The rows of the ensemble in use: points still in the fit, and draws.
+  std::vector<int> kept_points_;
+  std::vector<int> kept_draws_;
   InputSignals inputs_;
   EnsemblePropagator ensemble_;
 };
 
-// Returns POINTS_FAILED for at least one failure among `points` points.
+// Returns POINTS_FAILED for at least one failure among `points` trajectories.
 Diagnostic DescribeFailures(const std::vector<PointFailure>& failures, int points);
 
 }  // namespace polyest::internal

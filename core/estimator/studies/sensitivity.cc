@@ -65,8 +65,9 @@ SensitivityAnalysis EmptyAnalysis(const ResolvedProblem& problem, const TimeGrid
   return result;
 }
 
+// `model_variance` (times × outputs) receives the variance of the model at the draws.
 void TakeIndices(const ExpandedOutputs& expanded, const TermMasks& masks,
-                 SensitivityAnalysis& result) {
+                 SensitivityAnalysis& result, Matrix& model_variance) {
   const Matrix squares = expanded.expansion.coefficients().cwiseAbs2();
   // Σ c_s² over the terms of each variable, columns × n.
   const Matrix first_order = squares.transpose() * masks.first_order;
@@ -82,6 +83,9 @@ void TakeIndices(const ExpandedOutputs& expanded, const TermMasks& masks,
     output.residual[k] = std::sqrt(expanded.residual_variance[column]);
     output.first_order.row(k) = first_order.row(column);
     output.total.row(k) = total.row(column);
+    const auto model = expanded.model.col(column);
+    model_variance(k, column % m) =
+        (model.array() - model.mean()).square().sum() / static_cast<double>(model.size() - 1);
   }
 }
 
@@ -151,41 +155,39 @@ void RankParameters(SensitivityAnalysis& result) {
                    [](const auto& a, const auto& b) { return a.share > b.share; });
 }
 
-// Reports the part of an output's variance over all time that the expansion leaves unexplained.
-void CheckResidual(const OutputSensitivity& output, double accuracy,
+// Reports by how much of an output's variance over all time (that of the model at the draws of the
+// prior: the expansion's own is too large where it leaves the model, and hides this) the expansion
+// differs from the model at these draws.
+void CheckResidual(const OutputSensitivity& output, const Vector& variance, double accuracy,
                    const std::vector<double>& time_s, std::vector<Diagnostic>& diagnostics) {
   const Vector weights = TimeWeights(output.mean.size());
-  const Vector variance = output.standard_deviation.cwiseAbs2();
   const Vector residual =
       (output.residual.array() > accuracy).select(output.residual.cwiseAbs2().array(), 0);
   const double unexplained = weights.dot(residual);
-  const double explained = weights.dot(variance);
-  if (unexplained <= kUnexplained * explained) return;
+  const double all = weights.dot(variance);
+  if (unexplained <= kUnexplained * all) return;
   Eigen::Index first = 0;
   while (residual[first] <= kUnexplained * variance[first]) ++first;
   diagnostics.push_back(
       {DiagnosticCode::kExpansionInaccurate,
-       absl::StrFormat("the expansion leaves %.2g %% of the variance of %s unexplained, and at t = "
-                       "%g s for the first time more than %g %%: its indices are uncertain by as "
-                       "much; a higher order or narrower priors bring it down",
-                       100 * unexplained / (explained + unexplained), output.output,
-                       time_s[static_cast<size_t>(first)], 100 * kUnexplained)});
+       absl::StrFormat(
+           "at draws of the prior the expansion differs from the model by %.2g %% of the "
+           "variance of %s, and at t = %g s for the first time by more than %g %%: its "
+           "indices and the ranking are wrong by as much; narrower priors bring it "
+           "down, or a higher order if the residual falls with it",
+           100 * unexplained / all, output.output, time_s[static_cast<size_t>(first)],
+           100 * kUnexplained)});
 }
 
 void Diagnose(const ResolvedProblem& problem, const PriorExpansion& expansion,
-              SensitivityAnalysis& result) {
-  for (const auto& output : result.outputs) {
-    CheckResidual(output, Accuracy(problem, output), result.time_s, result.diagnostics);
-  }
-  if (result.points == result.terms) {
-    result.diagnostics.push_back(
-        {DiagnosticCode::kExpansionInaccurate,
-         absl::StrFormat("%d points determine %d terms with none to spare, so that nothing shows "
-                         "how wrong the expansion is; set expansion.pointsPerTerm above 1",
-                         result.points, result.terms)});
+              const Matrix& model_variance, SensitivityAnalysis& result) {
+  for (size_t i = 0; i < result.outputs.size(); ++i) {
+    const OutputSensitivity& output = result.outputs[i];
+    CheckResidual(output, model_variance.col(static_cast<Eigen::Index>(i)),
+                  Accuracy(problem, output), result.time_s, result.diagnostics);
   }
   if (!expansion.failures().empty()) {
-    result.diagnostics.push_back(DescribeFailures(expansion.failures(), expansion.points()));
+    result.diagnostics.push_back(DescribeFailures(expansion.failures(), expansion.trajectories()));
   }
 }
 
@@ -219,8 +221,13 @@ absl::StatusOr<SensitivityAnalysis> AnalyzeSensitivity(const ResolvedProblem& pr
                            PriorExpansion::Make(problem, columns, options.threads, stop));
   SensitivityAnalysis result = EmptyAnalysis(problem, grid, columns);
   const TermMasks masks(expansion->basis());
+  Matrix model_variance(grid.count(), static_cast<Eigen::Index>(columns.size()));
   POLYEST_RETURN_IF_ERROR(expansion->Run(
-      grid, [&](const ExpandedOutputs& expanded) { TakeIndices(expanded, masks, result); }, stop));
+      grid,
+      [&](const ExpandedOutputs& expanded) {
+        TakeIndices(expanded, masks, result, model_variance);
+      },
+      stop));
   for (size_t i = 0; i < columns.size(); ++i) {
     OutputSensitivity& output = result.outputs[i];
     DivideByVariance(Accuracy(problem, output), output);
@@ -230,7 +237,7 @@ absl::StatusOr<SensitivityAnalysis> AnalyzeSensitivity(const ResolvedProblem& pr
   result.order = expansion->basis().order();
   result.terms = expansion->basis().size();
   result.points = expansion->points();
-  Diagnose(problem, *expansion, result);
+  Diagnose(problem, *expansion, model_variance, result);
   return result;
 }
 

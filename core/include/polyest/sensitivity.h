@@ -30,8 +30,8 @@
 
 namespace polyest {
 
-// An expansion is inaccurate if it leaves more than this share of an output's variance unexplained:
-// residual² ÷ V.
+// An expansion is inaccurate if it differs from the model by more than this share of an output's
+// variance: residual² ÷ variance of the model, both at draws of the prior.
 inline constexpr double kUnexplained = 0.05;
 
 // What to compute.
@@ -56,8 +56,8 @@ struct OutputSensitivity {
   // integration, ten times its relative tolerance of the output's largest magnitude.
   Matrix first_order;
   Matrix total;  // T_i, 0 … 1; 0 where the output does not vary
-  // Root mean square of model − expansion at the collocation points (degrees of freedom Q − S).
-  // Where it is not small beside √V, the indices cannot be trusted.
+  // Root mean square of model − expansion at draws of the prior that are in no fit. Where it is not
+  // small beside √V, the indices cannot be trusted.
   Vector residual;
   // σ_o of a sample equal to the mean: the problem's noise of the output, or 1 % of the range of
   // its predictions.
@@ -82,8 +82,8 @@ struct SensitivityAnalysis {
   int order = 0;                            // of the expansion, p
   int terms = 0;                            // of the expansion, S
   int points = 0;                           // of collocation, Q
-  // kExpansionInaccurate when the expansion leaves more than kUnexplained of an output's variance
-  // unexplained, or has no points to spare that would show it; kPointsFailed.
+  // kExpansionInaccurate when the expansion differs from the model by more than kUnexplained of an
+  // output's variance; kPointsFailed.
   std::vector<Diagnostic> diagnostics;
 };
 
