@@ -2,6 +2,7 @@
 #include <absl/strings/str_format.h>
 #include <absl/strings/string_view.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "client/cli/answer.h"
@@ -28,6 +29,20 @@ absl::StatusOr<v1::ComputePropagationResponse> Propagate(const PropagateArgument
   auto response = MakeBackend(arguments.place)->ComputePropagation(request);
   if (!response.ok()) return InFiles(response.status(), {.problem = arguments.problem_file});
   return response;
+}
+
+// Says which numbers are those of draws of the model.
+void PrintDrawn(const v1::ComputePropagationResponse& propagation, std::ostream& out) {
+  out << absl::StrFormat("compared with the model at %d draws of the prior\n",
+                         propagation.draw_count());
+  for (const auto& output : propagation.outputs()) {
+    const auto drawn = std::count(output.from_draws().begin(), output.from_draws().end(), true);
+    if (drawn == 0) continue;
+    out << absl::StrFormat(
+        "%s: at %d of %d times the numbers are those of the draws, because the expansion does not "
+        "follow the model; their residual is the standard error of the mean\n",
+        output.name(), drawn, output.from_draws_size());
+  }
 }
 
 // Prints one table per output.
@@ -57,6 +72,7 @@ void PrintTables(const v1::ComputePropagationResponse& propagation, std::ostream
   out << absl::StrFormat("expansion: order %d, %d terms, %d points\n",
                          propagation.expansion().order(), propagation.expansion().term_count(),
                          propagation.expansion().point_count());
+  PrintDrawn(propagation, out);
   PrintDiagnostics(propagation.diagnostics(), out);
 }
 

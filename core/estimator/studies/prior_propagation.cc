@@ -31,8 +31,8 @@ Propagation EmptyPropagation(const ResolvedProblem& problem, const PropagationOp
   return result;
 }
 
-void Describe(const ConstVectorRef& samples, Eigen::Index k, const PropagationOptions& options,
-              PropagatedOutput& output) {
+void DescribeDistribution(const ConstVectorRef& samples, Eigen::Index k,
+                          const PropagationOptions& options, PropagatedOutput& output) {
   Vector sorted = samples;
   std::sort(sorted.begin(), sorted.end());
   for (size_t i = 0; i < options.probabilities.size(); ++i) {
@@ -44,7 +44,9 @@ void Describe(const ConstVectorRef& samples, Eigen::Index k, const PropagationOp
   }
 }
 
-// Derives the results at some times from their expansion.
+// Derives the results at some times. The expansion's numbers are as wrong as the expansion is at
+// the draws, and those of the draws as a mean of as many independent draws would be; the more
+// accurate ones count.
 void Describe(const ExpandedOutputs& expanded, const PropagationOptions& options,
               Propagation& result) {
   const bool sampled = !options.probabilities.empty() || options.density_bins > 0;
@@ -52,13 +54,41 @@ void Describe(const ExpandedOutputs& expanded, const PropagationOptions& options
   const Vector mean = expanded.expansion.Mean();
   const Vector deviation = expanded.expansion.StandardDeviation();
   const auto m = static_cast<Eigen::Index>(result.outputs.size());
+  const auto draws = static_cast<double>(expanded.model.rows());
   for (Eigen::Index column = 0; column < mean.size(); ++column) {
     PropagatedOutput& output = result.outputs[static_cast<size_t>(column % m)];
     const Eigen::Index k = expanded.first_time + column / m;
-    output.mean[k] = mean[column];
-    output.standard_deviation[k] = deviation[column];
-    output.residual[k] = std::sqrt(expanded.residual_variance[column]);
-    if (sampled) Describe(samples.col(column), k, options, output);
+    const auto model = expanded.model.col(column);
+    const double model_mean = model.mean();
+    const double model_deviation =
+        std::sqrt((model.array() - model_mean).square().sum() / (draws - 1));
+    const double residual = std::sqrt(expanded.residual_variance[column]);
+    const double standard_error = model_deviation / std::sqrt(draws);
+    const bool from_draws = residual > standard_error;
+    output.mean[k] = from_draws ? model_mean : mean[column];
+    output.standard_deviation[k] = from_draws ? model_deviation : deviation[column];
+    output.residual[k] = from_draws ? standard_error : residual;
+    output.from_draws.push_back(from_draws);
+    if (!sampled) continue;
+    DescribeDistribution(from_draws ? model : samples.col(column), k, options, output);
+  }
+}
+
+// Draws that fail are missing where they count, and nothing tells what they would have said.
+void Diagnose(const PriorExpansion& expansion, Propagation& result) {
+  if (expansion.failures().empty()) return;
+  result.diagnostics.push_back(DescribeFailures(expansion.failures(), expansion.trajectories()));
+  for (const PropagatedOutput& output : result.outputs) {
+    const auto first = std::find(output.from_draws.begin(), output.from_draws.end(), true);
+    if (first == output.from_draws.end()) continue;
+    const auto k = static_cast<size_t>(first - output.from_draws.begin());
+    result.diagnostics.push_back(
+        {DiagnosticCode::kExpansionInaccurate,
+         absl::StrFormat("at t = %g s for the first time the expansion does not follow %s, and not "
+                         "all draws of the prior that stand in for it could be integrated: mean, "
+                         "standard deviation and quantiles are those of the others; a prior "
+                         "without the values at which the model fails makes them right",
+                         result.time_s[k], output.output)});
   }
 }
 
@@ -103,7 +133,9 @@ absl::StatusOr<Propagation> PropagatePrior(const ResolvedProblem& problem,
   result.order = expansion->basis().order();
   result.terms = expansion->basis().size();
   result.points = expansion->points();
+  result.draws = expansion->draws();
   result.failures = expansion->failures();
+  Diagnose(*expansion, result);
   return result;
 }
 

@@ -1,6 +1,13 @@
 #pragma once
 
 // What the prior predicts for the outputs over time, before anything is measured.
+//
+// The model runs at the collocation points of an expansion over the whole prior, and at draws of
+// the prior that are in no fit. The results at a time are those of the expansion if its root mean
+// square error at the draws is at most the standard error of a mean over them, and else those of
+// the draws themselves. An expansion that follows the model is more accurate than any number of
+// draws; one that does not (an oscillation whose phase varies by more than the order can follow, or
+// a prior with a long tail) says something about itself and not about the model.
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
@@ -10,6 +17,7 @@
 #include <vector>
 
 #include "polyest/density.h"
+#include "polyest/diagnostic.h"
 #include "polyest/integration_options.h"
 #include "polyest/problem.h"
 #include "polyest/stop.h"
@@ -45,9 +53,10 @@ struct PropagatedOutput {
   Vector mean;                // one for each time
   Vector standard_deviation;  // one for each time
   Matrix quantiles;           // times × probabilities
-  // Root mean square of model − expansion at the collocation points, one for each time (degrees of
-  // freedom Q − S): the error of the numbers above.
+  // The error of the numbers above, one for each time: the root mean square of model − expansion at
+  // the draws of the prior, or the standard error of the draws' mean where they are of the draws.
   Vector residual;
+  std::vector<bool> from_draws;  // one for each time: of the draws, or else of the expansion
   std::vector<DensityEstimate> densities;  // one for each time, or none
 };
 
@@ -58,11 +67,16 @@ struct Propagation {
   int order = 0;                          // of the expansion, p
   int terms = 0;                          // of the expansion, S
   int points = 0;                         // of collocation, Q
-  std::vector<PointFailure> failures;     // points left out
+  int draws = 0;                          // of the prior, besides
+  // Trajectories left out, of the points (from 0) and of the draws (from Q).
+  std::vector<PointFailure> failures;
+  // kPointsFailed, and kExpansionInaccurate where numbers are of draws of which some have failed.
+  std::vector<Diagnostic> diagnostics;
 };
 
-// Computes the outputs over time under the problem's prior, on one expansion over the whole prior.
-// Points that cannot be integrated are left out while more than S remain, else FAILED_PRECONDITION.
+// Computes the outputs over time under the problem's prior, on one expansion over the whole prior
+// and draws of it. Trajectories that cannot be integrated are left out while more than S points and
+// two draws remain, else FAILED_PRECONDITION.
 // INVALID_ARGUMENT names the field, the value and the rule.
 absl::StatusOr<Propagation> PropagatePrior(const Problem& problem,
                                            const PropagationOptions& options,

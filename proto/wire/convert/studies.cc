@@ -1,6 +1,5 @@
 #include "proto/wire/convert/studies.h"
 
-#include "core/estimator/expansion/prior_expansion.h"
 #include "proto/wire/convert/estimate.h"
 #include "proto/wire/convert/expansion_used.h"
 #include "proto/wire/convert/repeated.h"
@@ -15,6 +14,7 @@ void ToProto(const PropagatedOutput& output, v1::ComputePropagationResponse::Out
   Append(output.standard_deviation, *proto.mutable_std_dev());
   Append(output.quantiles, *proto.mutable_quantiles());
   Append(output.residual, *proto.mutable_residual());
+  proto.mutable_from_draws()->Add(output.from_draws.begin(), output.from_draws.end());
   for (const DensityEstimate& density : output.densities) {
     v1::ComputePropagationResponse::Density& added = *proto.add_densities();
     Append(density.value, *added.mutable_value());
@@ -56,9 +56,9 @@ v1::ComputePropagationResponse ToProto(const Propagation& propagation,
   }
   response.mutable_probabilities()->Add(probabilities.begin(), probabilities.end());
   *response.mutable_expansion() = ToExpansionUsed(propagation);
-  if (!propagation.failures.empty()) {
-    *response.add_diagnostics() =
-        ToProto(DescribeFailures(propagation.failures, propagation.points));
+  response.set_draw_count(propagation.draws);
+  for (const Diagnostic& diagnostic : propagation.diagnostics) {
+    *response.add_diagnostics() = ToProto(diagnostic);
   }
   return response;
 }

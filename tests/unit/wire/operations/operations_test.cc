@@ -117,8 +117,9 @@ TEST(PropagationToProto, IsRowMajorAndTellsOfFailures) {
   propagation.order = 3;
   propagation.terms = 4;
   propagation.points = 8;
-  propagation.failures.resize(2);
-  propagation.failures[0] = {.point = 1, .time_s = 0.5, .flag = -4, .reason = "it blew up"};
+  propagation.outputs[0].from_draws = {false, true};
+  propagation.draws = 512;
+  propagation.diagnostics = {{DiagnosticCode::kPointsFailed, "2 of 520 failed"}};
   const v1::ComputePropagationResponse response = ToProto(propagation, {0.1, 0.9});
   EXPECT_EQ(response.time_s_size(), 2);
   EXPECT_EQ(response.probabilities(1), 0.9);
@@ -136,8 +137,9 @@ TEST(PropagationToProto, IsRowMajorAndTellsOfFailures) {
   EXPECT_EQ(x.densities(0).density(0), 12);
   ASSERT_EQ(response.diagnostics_size(), 1);
   EXPECT_EQ(response.diagnostics(0).code(), v1::Diagnostic::POINTS_FAILED);
-  EXPECT_THAT(response.diagnostics(0).message(),
-              testing::AllOf(testing::HasSubstr("2 of 8"), testing::HasSubstr("it blew up")));
+  EXPECT_EQ(response.diagnostics(0).message(), "2 of 520 failed");
+  EXPECT_EQ(response.draw_count(), 512);
+  EXPECT_THAT(x.from_draws(), testing::ElementsAre(false, true));
 }
 
 TEST(PropagationOptions, ComeFromTheRequest) {

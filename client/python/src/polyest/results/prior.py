@@ -46,10 +46,14 @@ class PropagationOutput:
     std_dev: Floats
     #: (T, P), the quantiles.
     quantiles: Floats
-    #: (T,), root mean square of model − expansion at the collocation points.
+    #: (T,), the error of the numbers above: root mean square of model − expansion at draws of the
+    #: prior, or the standard error of the draws' mean where `from_draws` is set.
     residual: Floats
     #: For each time the pair of (B,) centres of bins and (B,) densities; empty if not asked for.
     densities: list[tuple[Floats, Floats]]
+    #: For each time, whether the numbers are those of the model at the draws, because the expansion
+    #: does not follow it there.
+    from_draws: list[bool]
 
 
 @dataclass(frozen=True)
@@ -64,8 +68,10 @@ class Propagation:
     probabilities: Floats
     #: The expansion used.
     expansion: ExpansionUsed
-    #: POINTS_FAILED where it applies.
+    #: EXPANSION_INACCURATE and POINTS_FAILED where they apply.
     diagnostics: list[Diagnostic]
+    #: Draws of the prior at which the model itself ran.
+    draw_count: int
 
     def __getitem__(self, output: str) -> PropagationOutput:
         """Returns one output. Raises KeyError."""
@@ -97,12 +103,14 @@ def propagation_of(message: study_service_pb2.ComputePropagationResponse) -> Pro
         return PropagationOutput(
             one.name, one.unit, array(one.mean), array(one.std_dev), array(one.quantiles, *shape),
             array(one.residual),
-            [(array(density.value), array(density.density)) for density in one.densities])
+            [(array(density.value), array(density.density)) for density in one.densities],
+            list(one.from_draws))
 
     return Propagation(array(message.time_s),
                        {one.name: output_of(one) for one in message.outputs},
                        array(message.probabilities), ExpansionUsed.of_message(message.expansion),
-                       [Diagnostic.of_message(one) for one in message.diagnostics])
+                       [Diagnostic.of_message(one) for one in message.diagnostics],
+                       message.draw_count)
 
 
 @dataclass(frozen=True)
