@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "core/model/equations/equation_model.h"
 #include "tests/unit/core/estimator/studies/ramp.h"
 
 namespace polyest::internal::ramp {
@@ -38,6 +39,7 @@ TEST(PropagatePrior, HasTheClosedFormOfALinearModel) {
     EXPECT_NEAR(x.mean[k], 2 * t, 1e-9);
     EXPECT_NEAR(x.standard_deviation[k], t / std::sqrt(3.0), 1e-9);
     EXPECT_NEAR(x.residual[k], 0, 1e-9);
+    EXPECT_FALSE(x.from_draws[static_cast<size_t>(k)]);
     // The error of 10,000 low-discrepancy draws is about a thousandth.
     EXPECT_NEAR(x.quantiles(k, 0), 1.05 * t, 2e-3);
     EXPECT_NEAR(x.quantiles(k, 1), 2 * t, 2e-3);
@@ -89,7 +91,11 @@ TEST(PropagatePrior, LeavesOutPointsThatFailWhileEnoughRemain) {
   Problem problem = RampProblem();
   problem.fixed["limit"] = 2.6;  // Two of the 12 values of a lie above it.
   const Propagation result = PropagatePrior(Resolve(problem), UntilTwo(), {}).value();
-  EXPECT_EQ(result.failures.size(), 2u);
+  // So do a fifth of the 512 draws.
+  EXPECT_NEAR(static_cast<double>(result.failures.size()), 2 + 0.2 * 512, 2);
+  ASSERT_EQ(result.diagnostics.size(), 1u);
+  EXPECT_EQ(result.diagnostics[0].code, DiagnosticCode::kPointsFailed);
+  EXPECT_THAT(result.diagnostics[0].message, HasSubstr("of 524 trajectories"));
   for (const PointFailure& failure : result.failures) {
     EXPECT_GT(failure.time_s, 0.9);
     EXPECT_FALSE(failure.reason.empty());
@@ -134,6 +140,84 @@ TEST(PropagatePrior, RefusalNamesFieldValueAndRule) {
   EXPECT_THAT(refusal([](auto& o) { o.outputs = {"x", "x"}; }), HasSubstr("twice"));
   EXPECT_THAT(refusal([](auto& o) { o.step_s = 1e-300; }, absl::StatusCode::kResourceExhausted),
               HasSubstr("limit"));
+}
+
+Problem ProblemOf(EquationSpecification equations, UncertainParameter uncertain) {
+  Problem problem;
+  problem.model = MakeEquationModel(equations).value();
+  problem.uncertain = {std::move(uncertain)};
+  return problem;
+}
+
+// The phase of y = cos(w t) varies by up to 20 rad, which no expansion of order 3 follows. With w
+// uniform on [6, 7] the mean is (sin 7t − sin 6t)/t, and that of y² is ½ + (sin 14t − sin
+// 12t)/(4t).
+TEST(PropagatePrior, HasTheClosedFormOfAnOscillationWhosePhaseIsUncertain) {
+  PropagationOptions options;
+  options.until_s = 20;
+  options.step_s = 0.25;
+  const Propagation result =
+      PropagatePrior(Resolve(ProblemOf({.outputs = {{"y", "cos(w*t)"}}},
+                                       UncertainParameter::Uniform("w", 6, 7).value())),
+                     options, {})
+          .value();
+  EXPECT_EQ(result.draws, 512);
+  EXPECT_TRUE(result.diagnostics.empty());
+  const PropagatedOutput& y = result.outputs[0];
+  EXPECT_FALSE(y.from_draws[1]);
+  EXPECT_TRUE(y.from_draws[80]);
+  for (int k = 1; k <= 80; ++k) {
+    const double t = result.time_s[static_cast<size_t>(k)];
+    const double mean = (std::sin(7 * t) - std::sin(6 * t)) / t;
+    const double square = 0.5 + (std::sin(14 * t) - std::sin(12 * t)) / (4 * t);
+    // Four standard errors. That of a standard deviation is √((μ₄/σ⁴ − 1)/N)/2 of it, at most that
+    // of the mean while μ₄ ≤ 5 σ⁴.
+    EXPECT_NEAR(y.mean[k], mean, 4 * y.residual[k]) << t;
+    EXPECT_NEAR(y.standard_deviation[k], std::sqrt(square - mean * mean), 4 * y.residual[k]) << t;
+  }
+  // At 20 s the phase has gone through 20 rad, beyond three turns, so that y is all but an arcsine:
+  // the quantiles are near −cos(0.025 π), 0 and cos(0.025 π).
+  EXPECT_NEAR(y.quantiles(80, 0), -0.997, 0.01);
+  EXPECT_NEAR(y.quantiles(80, 2), 0.997, 0.01);
+}
+
+// The values of y = 1/(1 + (k/10)²) lie in [0, 1] however large k is, and those of a polynomial in
+// ln k do not. The oracle is the mid-point rule over the probability of k.
+TEST(PropagatePrior, IsQuadratureForALongTail) {
+  const double variance = std::log(5.0);  // of ln k, for a standard deviation of twice the mean
+  const Germ germ = Germ::Normal();
+  double mean = 0, square = 0;
+  constexpr int kIntervals = 20'000;
+  for (int i = 0; i < kIntervals; ++i) {
+    const double xi = germ.Quantile((i + 0.5) / kIntervals);
+    const double k = 30 * std::exp(std::sqrt(variance) * xi - variance / 2);
+    const double y = 1 / (1 + k * k / 100);
+    mean += y / kIntervals;
+    square += y * y / kIntervals;
+  }
+  for (const int order : {2, 3, 9}) {
+    Problem problem = ProblemOf({.outputs = {{"y", "1/(1 + (k/10)^2)"}}},
+                                UncertainParameter::Lognormal("k", 30, 60).value());
+    problem.expansion.order = order;
+    const Propagation result = PropagatePrior(Resolve(problem), UntilTwo(), {}).value();
+    const PropagatedOutput& y = result.outputs[0];
+    EXPECT_NEAR(y.mean[4], mean, 4 * y.residual[4]) << order;
+    EXPECT_NEAR(y.standard_deviation[4], std::sqrt(square - mean * mean), 4 * y.residual[4]);
+    EXPECT_GE(y.quantiles(4, 0), 0) << order;
+    EXPECT_LE(y.quantiles(4, 2), 1) << order;
+  }
+}
+
+TEST(PropagatePrior, SaysThatDrawsAreMissingWhereTheyCount) {
+  // The state x becomes infinite soon after 0.5 s where a passes 1.8.
+  const Problem problem = ProblemOf({.states = {{"x", "a + if(a > 1.8 && t > 0.5, 1e4*x^2, 0)"}},
+                                     .outputs = {{"y", "cos(40*x)"}}},
+                                    UncertainParameter::Uniform("a", 1, 2).value());
+  const Propagation result = PropagatePrior(Resolve(problem), UntilTwo(), {}).value();
+  ASSERT_EQ(result.diagnostics.size(), 2u);
+  EXPECT_EQ(result.diagnostics[0].code, DiagnosticCode::kPointsFailed);
+  EXPECT_EQ(result.diagnostics[1].code, DiagnosticCode::kExpansionInaccurate);
+  EXPECT_THAT(result.diagnostics[1].message, HasSubstr("does not follow y"));
 }
 
 TEST(PropagatePrior, RefusesAStreamedInput) {
