@@ -113,11 +113,11 @@ TEST(PropagationToProto, IsRowMajorAndTellsOfFailures) {
        .standard_deviation = (Vector(2) << 3, 4).finished(),
        .quantiles = (Matrix(2, 2) << 5, 6, 7, 8).finished(),
        .residual = (Vector(2) << 9, 10).finished(),
+       .from_draws = {false, true},
        .densities = {{(Vector(1) << 11).finished(), (Vector(1) << 12).finished()}}}};
   propagation.order = 3;
   propagation.terms = 4;
   propagation.points = 8;
-  propagation.outputs[0].from_draws = {false, true};
   propagation.draws = 512;
   propagation.diagnostics = {{DiagnosticCode::kPointsFailed, "2 of 520 failed"}};
   const v1::ComputePropagationResponse response = ToProto(propagation, {0.1, 0.9});
