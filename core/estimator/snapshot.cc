@@ -121,7 +121,8 @@ void serialize(Archive& archive, AbsorbedRows& absorbed) {
           absorbed.check_chi_squared, absorbed.check_residual, absorbed.check_valid,
           absorbed.point_chi_squared, absorbed.windows, absorbed.profiles, absorbed.blocks,
           absorbed.largest, absorbed.control_scores, absorbed.control_valid,
-          absorbed.point_log_variance, absorbed.carried_error, absorbed.carried_rate, absorbed.few);
+          absorbed.point_log_variance, absorbed.carried_error, absorbed.carried_rate, absorbed.few,
+          absorbed.densities);
 }
 
 template <class Archive>

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/bayes/mismatch.h"
+#include "core/bayes/outlier_density.h"
 #include "core/bayes/robust_samples.h"
 #include "core/bayes/window_sums.h"
 #include "core/common/types.h"
@@ -47,6 +48,9 @@ struct AbsorbedRows {
   double log_noise = 0;     // Σ ½ log σ² + what outliers' weights leave out of the likelihood
   double log_variance = 0;  // as log_noise, with R in place of σ²
   std::vector<int64_t> outliers;  // per channel
+  // Per channel: the density of the samples that have been weighed as outliers are, at the centre
+  // at which they were.
+  std::vector<OutlierDensity> densities;
   // Each channel's previous sample in units of its noise; zero at the beginning of a run.
   int summed_run = -1;
   Matrix previous_coefficients;  // S × m

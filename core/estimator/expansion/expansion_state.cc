@@ -115,7 +115,11 @@ bool HasSizesOf(const AbsorbedRows& state, const AbsorbedRows& fresh, bool has_w
   const auto alike = [](const ResidualBlocks& a, const ResidualBlocks& b) {
     return a.HasSizesOf(b);
   };
+  const auto of_same = [](const OutlierDensity& a, const OutlierDensity& b) {
+    return a.outliers() == b.outliers() && a.IsValid();
+  };
   return state.sums.size() == fresh.sums.size() &&
+         std::ranges::equal(state.densities, fresh.densities, of_same) &&
          state.windows.Suits(fresh.sums, has_windows ? state.rows : 0) &&
          std::ranges::equal(state.profiles, fresh.profiles, same) &&
          std::ranges::equal(state.blocks, fresh.blocks, alike) &&

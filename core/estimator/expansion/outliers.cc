@@ -47,6 +47,29 @@ void RegionalExpansion::CountOutlier(int channel, const ConstVectorRef& coeffici
   absorbed_.sums[c].surplus += error * error / variance - OutlierDegrees(outliers);
 }
 
+// Adds a weighted sample's density at the centre. `noise` is σ² without the weight, `variance` is R
+// as in the sums, and `lack` what its weight leaves out of the likelihood.
+void RegionalExpansion::AddToDensity(int channel, const ConstVectorRef& coefficients, double z,
+                                     double noise, double own_error, double variance, double lack) {
+  OutlierDensity& density = absorbed_.densities[static_cast<size_t>(channel)];
+  if (density.outliers() == OutlierHandling::kNone) return;
+  const double all = noise + own_error;
+  const double normalized = VarianceFactor(density.outliers()) * noise + own_error;
+  density.Add((z - coefficients.dot(centre_phi_)) / std::sqrt(all), all / variance,
+              0.5 * std::log(normalized / all) + lack);
+}
+
+const OutlierDensity* RegionalExpansion::DensityOfWeighted(int channel) const {
+  const OutlierDensity& density = absorbed_.densities[static_cast<size_t>(channel)];
+  if (density.outliers() == OutlierHandling::kNone || KeptSamples(channel)) return nullptr;
+  return &density;
+}
+
+Vector RegionalExpansion::CentreOfWeights() const {
+  const Vector& centre = noise_.posterior.centre;
+  return centre.size() == 0 ? design_.reference : design_.region.ToLocal(centre);
+}
+
 const RobustSamples* RegionalExpansion::KeptSamples(int channel) const {
   if (!absorbed_.few) return nullptr;
   const RobustSamples& samples = absorbed_.few->channels[static_cast<size_t>(channel)];
@@ -83,14 +106,18 @@ void RegionalExpansion::AddToFew(int channel, int column, double z, double noise
   SampleBySample& few = *absorbed_.few;
   RobustSamples& kept = few.channels[static_cast<size_t>(channel)];
   const OutlierHandling outliers = kept.outliers();
+  const double sigma = block_.noise[static_cast<size_t>(column)];
+  // The normalization of weighted samples is that of the sums (Normalize).
+  const NoiseModel& model = problem_.problem().measured[static_cast<size_t>(channel)].noise;
+  double normal = VarianceFactor(model.outliers) * sigma * sigma;
   if (outliers != OutlierHandling::kNone) {
-    const double sigma = block_.noise[static_cast<size_t>(column)];
-    noise = sigma * sigma;
+    noise = normal = sigma * sigma;
     lack = LackOfDensity(outliers);
   }
-  const double variance = noise + residual_variance_[column] / noise_.misfit_of_weights;
-  few.log_noise += 0.5 * std::log(noise) + lack;
-  few.log_variance += 0.5 * std::log(variance) + lack;
+  const double own_error = residual_variance_[column] / noise_.misfit_of_weights;
+  const double variance = noise + own_error;
+  few.log_noise += 0.5 * std::log(normal) + lack;
+  few.log_variance += 0.5 * std::log(normal + own_error) + lack;
   few.own_error += residual_variance_[column] / variance + absorbed_.carried_rate;
   const auto chi_squared = [&](double y, double scale) {
     return 2 * RobustLoss(outliers, (z - y) / std::sqrt(scale));

@@ -39,6 +39,7 @@ AbsorbedRows::AbsorbedRows(int terms, int channels, Eigen::Index points, Eigen::
     : sums(static_cast<size_t>(channels), ChannelSums(terms)),
       discount(Vector::Zero(channels)),
       outliers(static_cast<size_t>(channels), 0),
+      densities(static_cast<size_t>(channels)),
       previous_coefficients(Matrix::Zero(terms, channels)),
       previous_error(Vector::Zero(channels)),
       profiles(static_cast<size_t>(channels)),
@@ -98,6 +99,10 @@ void RegionalExpansion::BeginSums() {
     ChannelSums& sums = absorbed_.sums[static_cast<size_t>(c)];
     const bool learned = noise_.channels[static_cast<size_t>(c)].learned;
     sums.scale_unknown = model.unknown && learned;
+    // Filters give their samples the density themselves.
+    if (!problem_.uses_filters()) {
+      absorbed_.densities[static_cast<size_t>(c)] = OutlierDensity(model.outliers);
+    }
     // A time constant found by its likelihood is taken as known: the one lag that is integrated out
     // is not that of irregular samples.
     const bool found = noise_.channels[static_cast<size_t>(c)].time_constant_s > 0 &&
@@ -325,6 +330,7 @@ void RegionalExpansion::AbsorbSample(int row, int c) {
   absorbed_.carried_error += absorbed_.carried_rate;
   Normalize(VarianceFactor(outliers) * sigma * sigma, own_error, lack);
   CountOutlier(c, coefficients, z, variance, deviation);
+  AddToDensity(c, coefficients, z, sigma * sigma, own_error, variance, lack);
   Compare(column, z, noise);
   CompareControls(column, variance);
   if (absorbed_.few) AddToFew(c, column, z, noise, lack);

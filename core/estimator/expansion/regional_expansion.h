@@ -149,6 +149,11 @@ class RegionalExpansion {
   const Vector& LinearizedAt() const { return linearized_at_; }  // η, n
   // Returns the number of samples of a channel that have less than half their weight.
   int64_t Outliers(int channel) const { return absorbed_.outliers[static_cast<size_t>(channel)]; }
+  // Returns the density of the samples of a channel with outliers that its sums weigh; null without
+  // any, or while they are kept.
+  const OutlierDensity* DensityOfWeighted(int channel) const;
+  // Returns the point at which outliers are judged, η.
+  Vector CentreOfWeights() const;
   // Returns the samples of a channel with outliers while they are kept; null without any.
   const RobustSamples* KeptSamples(int channel) const;
   // Returns the term that makes the costs of different expansions of the same record comparable,
@@ -233,6 +238,8 @@ class RegionalExpansion {
                              double variance) const;
   void CountOutlier(int channel, const ConstVectorRef& coefficients, double z, double variance,
                     double deviation);
+  void AddToDensity(int channel, const ConstVectorRef& coefficients, double z, double noise,
+                    double own_error, double variance, double lack);
   void KeepFewSamples();
   int64_t MaxKeptSamples() const;
   void AddToFew(int channel, int column, double z, double noise, double lack);
