@@ -26,12 +26,26 @@ struct Contestant : Assessment {
   std::string file;
 };
 
+// Refuses a population: each run is integrated out when it ends, so that the problem has no
+// evidence, and held-out rows of several runs are not predicted at once.
+absl::Status CheckWithoutPopulation(const v1::Problem& problem, const std::string& file) {
+  for (int i = 0; i < problem.uncertain_size(); ++i) {
+    if (!problem.uncertain(i).population()) continue;
+    return absl::InvalidArgumentError(absl::StrFormat(
+        "%s: uncertain[%d].population: must be left out in a comparison, since a population has "
+        "neither evidence nor a score of held-out rows; fit --validate judges it by other data",
+        file, i));
+  }
+  return absl::OkStatus();
+}
+
 absl::StatusOr<Contestant> Assess(const std::string& file, const CompareArguments& arguments,
                                   Backend& backend, DataWarnings& warnings) {
   v1::Experiment experiment;
   const ExperimentInput input{arguments.place, file, arguments.files.back(),
                               arguments.data_options};
   POLYEST_ASSIGN_OR_RETURN(InputFiles files, ReadProblemAndData(input, experiment, warnings));
+  POLYEST_RETURN_IF_ERROR(CheckWithoutPopulation(experiment.problem(), file));
   files.record = files.data;  // some rows of which are held out
   auto weighed = Weigh(experiment, backend);
   if (!weighed.ok()) return InFiles(weighed.status(), files);
@@ -116,7 +130,9 @@ void PrintTable(const std::vector<Contestant>& all, std::ostream& out) {
   if (!weighed) {
     out << absl::StrFormat(
         "\n%s. The held-out samples prefer %s. Evidence is compared only where each problem has "
-        "one (α² = 1) and noise of unknown size is in the same outputs.\n",
+        "one (α² = 1, and a density of outliers known at the estimate) and noise of unknown size "
+        "is "
+        "in the same outputs.\n",
         judged, scored.file);
   } else if (&scored == &all.front()) {
     out << absl::StrFormat("\n%s. Evidence and held-out samples prefer %s.\n", judged, scored.file);

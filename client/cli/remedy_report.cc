@@ -162,7 +162,8 @@ void PrintTrial(const RemedyTrial& trial, std::ostream& out) {
     out << '\n';
     PrintSentence(out,
                   "No remedy was tried: the problem has no evidence to compare them by, since the "
-                  "prior's weight is not 1 or parameters of ended runs have been integrated out.");
+                  "prior's weight is not 1, parameters of ended runs have been integrated out, or "
+                  "outliers have been weighed too far from the estimate.");
     return;
   }
   if (trial.tried.empty()) {

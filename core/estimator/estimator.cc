@@ -289,6 +289,13 @@ absl::StatusOr<Prediction> Estimator::Implementation::PredictOther(PredictionSub
   const std::vector<int>& runs = options.record->run;
   const int last_run = runs.empty() ? 0 : *std::max_element(runs.begin(), runs.end());
   const int most = problem_.max_joint_runs();
+  if (last_run >= most && problem_.population()) {
+    return InvalidField(
+        "record.run",
+        absl::StrFormat("%d must be 0: the runs of a population are predicted one at a time, since "
+                        "their parameters are never known together",
+                        last_run));
+  }
   if (last_run >= most) {
     return InvalidField(
         "record.run",
