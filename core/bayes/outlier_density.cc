@@ -51,17 +51,16 @@ double Interpolated(const Vector& values, double x) {
 
 }  // namespace
 
-OutlierDensity::OutlierDensity(OutlierHandling outliers) : outliers_(outliers) {
+OutlierDensity::OutlierDensity(OutlierHandling outliers, bool size_unknown) : outliers_(outliers) {
   if (outliers == OutlierHandling::kNone) return;
-  losses_.setZero(kSizes);
-  curvatures_.setZero(kSizes);
+  losses_.setZero(size_unknown ? kSizes : 1);
+  curvatures_ = losses_;
 }
 
-bool OutlierDensity::IsValid() const {
-  const Eigen::Index nodes = outliers_ == OutlierHandling::kNone ? 0 : kSizes;
-  return count_ >= 0 && std::isfinite(excess_) && std::isfinite(precision_) &&
-         losses_.size() == nodes && curvatures_.size() == nodes && losses_.allFinite() &&
-         curvatures_.allFinite();
+bool OutlierDensity::IsValidLike(const OutlierDensity& fresh) const {
+  return outliers_ == fresh.outliers_ && losses_.size() == fresh.losses_.size() &&
+         curvatures_.size() == fresh.curvatures_.size() && count_ >= 0 && std::isfinite(excess_) &&
+         std::isfinite(precision_) && losses_.allFinite() && curvatures_.allFinite();
 }
 
 void OutlierDensity::Add(double u, double precision, double excess) {
@@ -69,6 +68,11 @@ void OutlierDensity::Add(double u, double precision, double excess) {
   ++count_;
   excess_ += excess;
   precision_ += precision;
+  if (losses_.size() == 1) {
+    losses_[0] += RobustLoss(outliers_, u);
+    curvatures_[0] += RobustCurvature(outliers_, u);
+    return;
+  }
   const SizeNodes& shrinkage = Shrinkage();
   if (outliers_ == OutlierHandling::kHuber) {
     const SizeNodes size = std::abs(u) * shrinkage;
@@ -91,11 +95,13 @@ double OutlierDensity::NormalizationOfAll() const {
 
 OutlierDensity::Value OutlierDensity::OfKnownSize() const {
   if (count_ == 0) return {0, 1, 1};
-  return {-losses_[kPresentSize] - NormalizationOfAll(), curvatures_[kPresentSize] / precision_,
+  const Eigen::Index present = losses_.size() == 1 ? 0 : kPresentSize;
+  return {-losses_[present] - NormalizationOfAll(), curvatures_[present] / precision_,
           VarianceFactor(outliers_)};
 }
 
 std::optional<OutlierDensity::Value> OutlierDensity::OfUnknownSize() const {
+  POLYEST_CHECK(losses_.size() == kSizes);
   const auto samples = static_cast<double>(count_);
   const auto cost = [&](double x) { return Interpolated(losses_, x) + samples * x; };
   const double last = kFirstSize + kSizeStep * (kSizes - 1), fine = kSizeStep / kPerNode;

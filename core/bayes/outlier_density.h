@@ -10,7 +10,8 @@
 //   −log p(x) = Σ ρ(u_k e^{−x}) + N x + N c + Σ ½ log v_k,
 //
 // −log of the density of one u being ρ + c (RobustLoss, LackOfDensity), and its curvature in the
-// predictions Σ ρ″(u_k e^{−x}) e^{−2x}/v_k, both at the nodes of a grid of x. The posterior of many
+// predictions Σ ρ″(u_k e^{−x}) e^{−2x}/v_k, both at the nodes of a grid of x, or at 0 alone if the
+// size is known. The posterior of many
 // samples is so narrow that the rest of the integral over the parameters is Laplace's.
 
 #include <cstdint>
@@ -24,11 +25,12 @@ namespace polyest::internal {
 class OutlierDensity {
  public:
   // Without outliers (kNone) it stands for a channel of which nothing is kept.
-  explicit OutlierDensity(OutlierHandling outliers = OutlierHandling::kNone);
+  explicit OutlierDensity(OutlierHandling outliers = OutlierHandling::kNone,
+                          bool size_unknown = false);
 
   OutlierHandling outliers() const { return outliers_; }
-  // Whether the sizes are those of this handling, and all numbers are finite.
-  bool IsValid() const;
+  // Whether the handling and the sizes are those of `fresh`, and all numbers are finite.
+  bool IsValidLike(const OutlierDensity& fresh) const;
 
   // Adds one sample with the residual u. `precision` is v/R, R being the variance that it has in
   // the sums, and `excess` what their normalization has for it in place of ½ log v.

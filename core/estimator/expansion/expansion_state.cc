@@ -116,7 +116,7 @@ bool HasSizesOf(const AbsorbedRows& state, const AbsorbedRows& fresh, bool has_w
     return a.HasSizesOf(b);
   };
   const auto of_same = [](const OutlierDensity& a, const OutlierDensity& b) {
-    return a.outliers() == b.outliers() && a.IsValid();
+    return a.IsValidLike(b);
   };
   return state.sums.size() == fresh.sums.size() &&
          std::ranges::equal(state.densities, fresh.densities, of_same) &&

@@ -101,7 +101,7 @@ void RegionalExpansion::BeginSums() {
     sums.scale_unknown = model.unknown && learned;
     // Filters give their samples the density themselves.
     if (!problem_.uses_filters()) {
-      absorbed_.densities[static_cast<size_t>(c)] = OutlierDensity(model.outliers);
+      absorbed_.densities[static_cast<size_t>(c)] = OutlierDensity(model.outliers, model.unknown);
     }
     // A time constant found by its likelihood is taken as known: the one lag that is integrated out
     // is not that of irregular samples.

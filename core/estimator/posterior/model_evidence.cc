@@ -115,7 +115,8 @@ class DensityCorrection {
 };
 
 // Returns what −J of all channels lacks to be the log of the likelihood, but for HeightOf.
-std::optional<double> LogConstants(const RegionalExpansion& expansion, const Cost& cost,
+std::optional<double> LogConstants(const ResolvedProblem& problem,
+                                   const RegionalExpansion& expansion, const Cost& cost,
                                    const PosteriorDraws& draws) {
   std::optional<DensityCorrection> correction;
   double constants = 0;
@@ -127,7 +128,8 @@ std::optional<double> LogConstants(const RegionalExpansion& expansion, const Cos
       continue;
     }
     if (!correction) correction.emplace(expansion, cost);
-    if (!correction->Add(sums, *density)) return std::nullopt;
+    const bool learns = problem.problem().measured[c].noise.unknown;
+    if (learns != sums.scale_unknown || !correction->Add(sums, *density)) return std::nullopt;
   }
   if (!correction) return constants;
   // Draws from a power of the likelihood are not where the density is.
@@ -155,7 +157,7 @@ std::optional<double> LogModelEvidence(const ResolvedProblem& problem,
   double evidence = cost.power() == 1
                         ? ShareOf(expansion, cost, draws).log_evidence
                         : LaplaceIntegral(expansion, cost, eta) - HeightOf(expansion, cost);
-  const std::optional<double> constants = LogConstants(expansion, cost, draws);
+  const std::optional<double> constants = LogConstants(problem, expansion, cost, draws);
   if (!constants || !std::isfinite(evidence + *constants)) return std::nullopt;
   return evidence + *constants;
 }
