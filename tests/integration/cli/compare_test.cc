@@ -114,30 +114,22 @@ TEST_F(CompareTest, RefusesWhatCannotBeCompared) {
   const std::string one = File("one.csv", "t,position\n0.5,0.1\n");
   EXPECT_THAT(refusal({linear_, one, "--hold-out", "0.3"}),
               HasSubstr("--hold-out: 0.3 of 1 rows leaves none to predict"));
-  const std::string population = File("population.json", R"({
-    "model": {"equations": {"outputs": {"position": "exp(-k*t)"
-}
-}
-}
-, "uncertain" : [ {
-  "name" : "k",
-  "normal" : {"mean" : 2, "stdDev" : 1},
-  "perRun" : true,
-  "population" : true
-} ],
-                "measured" : [ {"output" : "position", "noise" : {"absolute" : 0.05}} ]
-})");
+  const std::string population = File("population.json", R"json({
+    "model": {"equations": {"outputs": {"position": "exp(-k*t)"}}},
+    "uncertain": [{"name": "k", "normal": {"mean": 2, "stdDev": 1},
+                   "perRun": true, "population": true}],
+    "measured": [{"output": "position", "noise": {"absolute": 0.05}}]})json");
   EXPECT_THAT(refusal({population, data_}),
               HasSubstr("population.json: uncertain[0].population: must be left out"));
-EXPECT_THAT(refusal({linear_, data_, "--horizon", "2"}),
-            HasSubstr("--horizon: 2 must be left out, since none of the problems has process"));
-EXPECT_THAT(refusal(std::vector<std::string>(20, linear_)),
-            HasSubstr("20 problems are more than 19"));
-for (const char* const number : {"-1", "far", "nan", "inf"}) {
-  EXPECT_THAT(refusal({linear_, data_, "--horizon", number}), HasSubstr("--horizon")) << number;
-  EXPECT_THAT(refusal({linear_, data_, "--hold-out", number}), HasSubstr("--hold-out")) << number;
-  EXPECT_THAT(refusal({linear_, data_, "--deadline", number}), HasSubstr("--deadline")) << number;
-}
+  EXPECT_THAT(refusal({linear_, data_, "--horizon", "2"}),
+              HasSubstr("--horizon: 2 must be left out, since none of the problems has process"));
+  EXPECT_THAT(refusal(std::vector<std::string>(20, linear_)),
+              HasSubstr("20 problems are more than 19"));
+  for (const char* const number : {"-1", "far", "nan", "inf"}) {
+    EXPECT_THAT(refusal({linear_, data_, "--horizon", number}), HasSubstr("--horizon")) << number;
+    EXPECT_THAT(refusal({linear_, data_, "--hold-out", number}), HasSubstr("--hold-out")) << number;
+    EXPECT_THAT(refusal({linear_, data_, "--deadline", number}), HasSubstr("--deadline")) << number;
+  }
 }
 
 }  // namespace

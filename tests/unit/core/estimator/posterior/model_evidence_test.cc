@@ -213,7 +213,7 @@ double QuadratureOfLogEvidence(const Samples& samples, const WithOutliers& noise
   return largest + std::log(sum * cell);
 }
 
-class EvidenceWithOutliers : public testing::TestWithParam<WithOutliers> {};
+class EvidenceWithOutliers : public ::testing::TestWithParam<WithOutliers> {};
 
 TEST_P(EvidenceWithOutliers, IsThatOfTheirDensity) {
   const WithOutliers& noise = GetParam();
@@ -245,7 +245,8 @@ std::vector<WithOutliers> AllWithOutliers() {
   return all;
 }
 
-INSTANTIATE_TEST_SUITE_P(ModelEvidence, EvidenceWithOutliers, testing::ValuesIn(AllWithOutliers()));
+INSTANTIATE_TEST_SUITE_P(ModelEvidence, EvidenceWithOutliers,
+                         ::testing::ValuesIn(AllWithOutliers()));
 
 TEST(LogSumOfExponentials, NeedsAllValues) {
   EXPECT_NEAR(*LogSumOfExponentials({-1000.0, -1000.0}), -1000 + std::numbers::ln2, 1e-12);
