@@ -131,8 +131,7 @@ void PrintTable(const std::vector<Contestant>& all, std::ostream& out) {
     out << absl::StrFormat(
         "\n%s. The held-out samples prefer %s. Evidence is compared only where each problem has "
         "one (α² = 1, and a density of outliers known at the estimate) and noise of unknown size "
-        "is "
-        "in the same outputs.\n",
+        "is in the same outputs.\n",
         judged, scored.file);
   } else if (&scored == &all.front()) {
     out << absl::StrFormat("\n%s. Evidence and held-out samples prefer %s.\n", judged, scored.file);

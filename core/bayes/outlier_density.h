@@ -11,8 +11,7 @@
 //
 // −log of the density of one u being ρ + c (RobustLoss, LackOfDensity), and its curvature in the
 // predictions Σ ρ″(u_k e^{−x}) e^{−2x}/v_k, both at the nodes of a grid of x, or at 0 alone if the
-// size is known. The posterior of many
-// samples is so narrow that the rest of the integral over the parameters is Laplace's.
+// size is known. Over the posterior of many samples, which is narrow, that is enough.
 
 #include <cstdint>
 #include <optional>

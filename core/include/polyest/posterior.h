@@ -77,8 +77,9 @@ struct Posterior {
   // unit of a sample's density is 1/unit of its output. The difference of two problems' for the
   // same samples is the log of the odds that the samples give to them. Noise of unknown size counts
   // with p(s) ∝ 1/s, so that only problems with the same unknown noises can be compared. None where
-  // α² is not 1, where a component has none, and where parameters of ended runs have been
-  // integrated out.
+  // α² is not 1, where a component has none, where parameters of ended runs have been integrated
+  // out, and where samples with outliers contradict the noise or have not told its unknown size
+  // yet.
   std::optional<double> log_evidence;
   // Those of an estimate from the same draws, and kNotConverged if the chains have not mixed.
   std::vector<Diagnostic> diagnostics;
