@@ -12,8 +12,8 @@ namespace polyest::internal {
 namespace {
 
 constexpr double kHalfLogTwoPi = 0.9189385332046727;
-// SizeNodes of x = log of the factor of the working noise. Sixfold interpolation between them is
-// good to 10⁻⁷ of a sample's loss.
+// Nodes of x = log of the factor of the working noise. The polynomial through six of them is good
+// to 10⁻⁷ of a sample's loss.
 constexpr int kSizes = 31;
 constexpr double kSizeStep = 0.1, kFirstSize = -1.5;
 constexpr int kPresentSize = 15;  // x = 0

@@ -199,6 +199,11 @@ ExpandedOutputs PriorExpansion::Expand(int64_t first, const Matrix& values) {
           Expansion(basis_, std::move(coefficients)), std::move(model), std::move(variance)};
 }
 
+Vector ExpandedOutputs::ModelVariance() const {
+  const Matrix centred = model.rowwise() - model.colwise().mean();
+  return centred.colwise().squaredNorm().transpose() / static_cast<double>(model.rows() - 1);
+}
+
 Matrix PriorExpansion::Thetas() const {
   Matrix thetas(trajectories(), points_.cols());
   for (int row = 0; row < trajectories(); ++row) {

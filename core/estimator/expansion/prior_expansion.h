@@ -79,6 +79,9 @@ struct ExpandedOutputs {
   // draws × columns.
   Matrix model;
   Vector residual_variance;  // mean square of model − expansion at these draws
+
+  // Returns the variance of the model over these draws, as of a sample, for each column.
+  Vector ModelVariance() const;
 };
 
 class PriorExpansion {

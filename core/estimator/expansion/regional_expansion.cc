@@ -325,9 +325,7 @@ void RegionalExpansion::AbsorbSample(int row, int c) {
   AddDifference(c, coefficients, error, variance);
   AddToProfile(row, c, coefficients, z, variance);
   AddToBlocks(c, coefficients, z, variance);
-  absorbed_.discount[c] += own_error / variance;
-  absorbed_.own_error += residual_variance_[column] / variance + absorbed_.carried_rate;
-  absorbed_.carried_error += absorbed_.carried_rate;
+  AddOwnError(c, column, own_error, variance);
   Normalize(VarianceFactor(outliers) * sigma * sigma, own_error, lack);
   CountOutlier(c, coefficients, z, variance, deviation);
   AddToDensity(c, coefficients, z, sigma * sigma, own_error, variance, lack);
@@ -339,6 +337,13 @@ void RegionalExpansion::AbsorbSample(int row, int c) {
   absorbed_.point_chi_squared.col(c).array() +=
       (outputs_.col(column).head(points()).array() - z).square() / variance;
   ++absorbed_.samples;
+}
+
+// Adds what of the variance is the expansion's own error: `own_error` as it is discounted.
+void RegionalExpansion::AddOwnError(int channel, int column, double own_error, double variance) {
+  absorbed_.discount[channel] += own_error / variance;
+  absorbed_.own_error += residual_variance_[column] / variance + absorbed_.carried_rate;
+  absorbed_.carried_error += absorbed_.carried_rate;
 }
 
 // Adds to the normalization. `noise` is σ², `own_error` the residual's variance ρ, and `lack` the

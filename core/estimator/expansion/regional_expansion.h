@@ -256,6 +256,7 @@ class RegionalExpansion {
   void AddToProfile(int row, int channel, const ConstVectorRef& coefficients, double z,
                     double variance);
   void AddLogVariance(int column, double noise, double variance);
+  void AddOwnError(int channel, int column, double own_error, double variance);
   void Normalize(double noise, double own_error, double lack);
 
   // What check points and controls tell of the expansion's error (control_trajectories.cc).

@@ -55,17 +55,16 @@ void Describe(const ExpandedOutputs& expanded, const PropagationOptions& options
   const Vector deviation = expanded.expansion.StandardDeviation();
   const auto m = static_cast<Eigen::Index>(result.outputs.size());
   const auto draws = static_cast<double>(expanded.model.rows());
+  const Vector model_variance = expanded.ModelVariance();
   for (Eigen::Index column = 0; column < mean.size(); ++column) {
     PropagatedOutput& output = result.outputs[static_cast<size_t>(column % m)];
     const Eigen::Index k = expanded.first_time + column / m;
     const auto model = expanded.model.col(column);
-    const double model_mean = model.mean();
-    const double model_deviation =
-        std::sqrt((model.array() - model_mean).square().sum() / (draws - 1));
+    const double model_deviation = std::sqrt(model_variance[column]);
     const double residual = std::sqrt(expanded.residual_variance[column]);
     const double standard_error = model_deviation / std::sqrt(draws);
     const bool from_draws = residual > standard_error;
-    output.mean[k] = from_draws ? model_mean : mean[column];
+    output.mean[k] = from_draws ? model.mean() : mean[column];
     output.standard_deviation[k] = from_draws ? model_deviation : deviation[column];
     output.residual[k] = from_draws ? standard_error : residual;
     output.from_draws.push_back(from_draws);

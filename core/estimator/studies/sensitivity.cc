@@ -74,6 +74,7 @@ void TakeIndices(const ExpandedOutputs& expanded, const TermMasks& masks,
   const Matrix total = squares.transpose() * masks.total;
   const Vector mean = expanded.expansion.Mean();
   const Vector deviation = expanded.expansion.StandardDeviation();
+  const Vector variance = expanded.ModelVariance();
   const auto m = static_cast<Eigen::Index>(result.outputs.size());
   for (Eigen::Index column = 0; column < mean.size(); ++column) {
     OutputSensitivity& output = result.outputs[static_cast<size_t>(column % m)];
@@ -83,9 +84,7 @@ void TakeIndices(const ExpandedOutputs& expanded, const TermMasks& masks,
     output.residual[k] = std::sqrt(expanded.residual_variance[column]);
     output.first_order.row(k) = first_order.row(column);
     output.total.row(k) = total.row(column);
-    const auto model = expanded.model.col(column);
-    model_variance(k, column % m) =
-        (model.array() - model.mean()).square().sum() / static_cast<double>(model.size() - 1);
+    model_variance(k, column % m) = variance[column];
   }
 }
 
