@@ -44,6 +44,7 @@ struct PropagateArguments {
   std::string problem_file;
   double until_s = 0;
   double step_s = 0;
+  int draws = 0;  // 0: the default
   Format format = Format::kTable;
 };
 
@@ -84,6 +85,7 @@ struct SensitivityArguments {
   std::string problem_file;
   double until_s = 0;
   double step_s = 0;  // 0: the default
+  int draws = 0;      // 0: the default
   std::vector<std::string> outputs;
   std::string plot_file;  // empty: none
   Format format = Format::kTable;

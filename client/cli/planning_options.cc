@@ -1,6 +1,7 @@
 // Adds the commands for the time before measurements, and the commands `schema` and `paper`.
 
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
 #include <absl/strings/str_join.h>
 
 #include <memory>
@@ -8,6 +9,7 @@
 #include "client/cli/command_registry.h"
 #include "client/cli/shared_options.h"
 #include "client/paper/experiments.h"
+#include "polyest/prior_propagation.h"
 
 namespace polyest::internal {
 namespace {
@@ -60,6 +62,14 @@ void AddCheck(CommandRegistry& registry) {
   AddFormat(command, arguments->format, {"table", "json"});
 }
 
+void AddPriorDraws(CLI::App& command, int& draws) {
+  command
+      .add_option("--draws", draws,
+                  absl::StrFormat("Draws of the prior at which the model itself runs (default %d)",
+                                  kPriorDraws))
+      ->check(WholeBetween(kMinPriorDraws, kMaxPriorDraws));
+}
+
 void AddPropagate(CommandRegistry& registry) {
   const auto arguments = std::make_shared<PropagateArguments>();
   CLI::App& command = registry.Add(
@@ -71,6 +81,7 @@ void AddPropagate(CommandRegistry& registry) {
   AddProblem(command, arguments->problem_file);
   command.add_option("--until", arguments->until_s, "The last time, s")->required();
   command.add_option("--step", arguments->step_s, "Time step, s")->required();
+  AddPriorDraws(command, arguments->draws);
   AddPlace(command, arguments->place);
   AddFormat(command, arguments->format, {"table", "json", "csv"});
 }
@@ -85,6 +96,7 @@ void AddSensitivity(CommandRegistry& registry) {
   AddProblem(command, arguments->problem_file);
   command.add_option("--until", arguments->until_s, "The last time, s")->required();
   command.add_option("--step", arguments->step_s, "Time step, s (default: a hundredth of --until)");
+  AddPriorDraws(command, arguments->draws);
   AddOutputs(command, arguments->outputs, "The outputs, comma-separated (default: measured)");
   AddPlace(command, arguments->place);
   AddPlot(command, arguments->plot_file, "outputs and shares over time");

@@ -26,6 +26,7 @@ absl::StatusOr<v1::ComputePropagationResponse> Propagate(const PropagateArgument
                            ReadCheckedProblem(arguments.problem_file, arguments.place));
   request.set_until_s(arguments.until_s);
   request.set_step_s(arguments.step_s);
+  request.set_draw_count(arguments.draws);
   auto response = MakeBackend(arguments.place)->ComputePropagation(request);
   if (!response.ok()) return InFiles(response.status(), {.problem = arguments.problem_file});
   return response;

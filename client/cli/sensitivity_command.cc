@@ -32,6 +32,7 @@ absl::StatusOr<Analysis> AnalyzeSensitivity(const SensitivityArguments& argument
                            ReadCheckedProblem(arguments.problem_file, arguments.place));
   request.set_until_s(arguments.until_s);
   request.set_step_s(arguments.step_s);
+  request.set_draw_count(arguments.draws);
   request.mutable_outputs()->Add(arguments.outputs.begin(), arguments.outputs.end());
   auto response = MakeBackend(arguments.place)->ComputeSensitivity(request);
   if (!response.ok()) return InFiles(response.status(), {.problem = arguments.problem_file});

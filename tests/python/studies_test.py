@@ -128,7 +128,7 @@ def test_a_propagation_is_the_mean_of_the_prior(client, problem):
 
 
 def test_sensitivities_are_shares(client, problem):
-    sensitivity = client.experiment(problem).sensitivity(2.0)
+    sensitivity = client.experiment(problem).sensitivity(2.0, draws=64)
     x = sensitivity["x"]
     assert x.total.shape == (len(sensitivity.time_s), 2) == x.first_order.shape
     assert (x.total >= x.first_order - 1e-9).all() and (x.total <= 1 + 1e-9).all()

@@ -28,9 +28,9 @@ constexpr int64_t kMaxCounted = int64_t{1} << 50;
 
 // Draws of the prior that continue the low-discrepancy sequence of the collocation points, so that
 // none of them is one.
-Matrix DrawPrior(const std::vector<Germ>& germs, Eigen::Index points) {
-  const int count = static_cast<int>(points) + kPriorDraws;
-  return CollocationPoints(PointSet::kHalton, germs, 1, count).value().bottomRows(kPriorDraws);
+Matrix DrawPrior(const std::vector<Germ>& germs, Eigen::Index points, int draws) {
+  const int count = static_cast<int>(points) + draws;
+  return CollocationPoints(PointSet::kHalton, germs, 1, count).value().bottomRows(draws);
 }
 
 absl::Status CheckNoStreamedInput(const ResolvedProblem& problem) {
@@ -137,7 +137,7 @@ absl::Status PropagateOver(const TimeGrid& grid, int64_t m, EnsemblePropagator& 
 
 absl::StatusOr<std::unique_ptr<PriorExpansion>> PriorExpansion::Make(const ResolvedProblem& problem,
                                                                      std::vector<int> outputs,
-                                                                     int threads,
+                                                                     int draws, int threads,
                                                                      const Stop& stop) {
   POLYEST_RETURN_IF_ERROR(CheckIsOfThePrior(problem));
   const ExpansionOptions& design = problem.problem().expansion;
@@ -150,18 +150,18 @@ absl::StatusOr<std::unique_ptr<PriorExpansion>> PriorExpansion::Make(const Resol
                            CollocationMatrix::Factor(*basis, points, stop));
   return std::unique_ptr<PriorExpansion>(new PriorExpansion(problem, std::move(outputs),
                                                             std::move(basis), std::move(points),
-                                                            std::move(matrix), threads));
+                                                            std::move(matrix), draws, threads));
 }
 
 PriorExpansion::PriorExpansion(const ResolvedProblem& problem, std::vector<int> outputs,
                                std::shared_ptr<const Basis> basis, Matrix points,
-                               CollocationMatrix matrix, int threads)
+                               CollocationMatrix matrix, int draws, int threads)
     : prior_(problem.prior()),
       outputs_(std::move(outputs)),
       basis_(std::move(basis)),
       points_(std::move(points)),
       matrix_(std::move(matrix)),
-      draws_(DrawPrior(prior_.germs(), points_.rows())),
+      draws_(DrawPrior(prior_.germs(), points_.rows(), draws)),
       kept_points_(static_cast<size_t>(points_.rows())),
       kept_draws_(static_cast<size_t>(draws_.rows())),
       inputs_(problem.MakeInputs()),

@@ -4,10 +4,10 @@
 // φ(ξ) with c_k = A⁺ Y_k, equations (3) to (10). The studies that need no data derive their results
 // from them. This is the paper's fixed expansion: its region does not move.
 //
-// The model itself runs at kPriorDraws further points, too, which are draws of the prior and in no
-// fit. The fit's own residuals cannot tell how wrong the expansion is: with few points to spare
-// they are small by construction, and they end where the points end, while a polynomial grows
-// fastest in the tails that the prior still has beyond them.
+// The model itself runs at further points, too, which are draws of the prior and in no fit. The
+// fit's own residuals cannot tell how wrong the expansion is: with few points to spare they are
+// small by construction, and they end where the points end, while a polynomial grows fastest in the
+// tails that the prior still has beyond them.
 
 #include <absl/functional/function_ref.h>
 #include <absl/status/statusor.h>
@@ -25,11 +25,6 @@
 #include "polyest/stop.h"
 
 namespace polyest::internal {
-
-// The number of draws at which the model is compared with the expansion. A quantile is then off by
-// at most about √(p (1 − p)/512) in probability, and the draws reach to about three standard
-// deviations of each germ.
-inline constexpr int kPriorDraws = 512;
 
 // The times 0, step, 2 step, …, until, in s.
 struct TimeGrid {
@@ -86,11 +81,12 @@ struct ExpandedOutputs {
 
 class PriorExpansion {
  public:
-  // Makes the expansion. Errors are those of CheckIsOfThePrior, CollocationPoints and
-  // CollocationMatrix::Factor. `problem` must outlive the expansion.
+  // Makes the expansion of `outputs`, and `draws` ≥ 2 draws of the prior. Errors are those of
+  // CheckIsOfThePrior, CollocationPoints and CollocationMatrix::Factor. `problem` must outlive the
+  // expansion.
   static absl::StatusOr<std::unique_ptr<PriorExpansion>> Make(const ResolvedProblem& problem,
-                                                              std::vector<int> outputs, int threads,
-                                                              const Stop& stop);
+                                                              std::vector<int> outputs, int draws,
+                                                              int threads, const Stop& stop);
 
   const Basis& basis() const { return *basis_; }
   int points() const { return static_cast<int>(points_.rows()); }  // Q
@@ -109,7 +105,7 @@ class PriorExpansion {
  private:
   PriorExpansion(const ResolvedProblem& problem, std::vector<int> outputs,
                  std::shared_ptr<const Basis> basis, Matrix points, CollocationMatrix matrix,
-                 int threads);
+                 int draws, int threads);
 
   Matrix Thetas() const;
   ExpandedOutputs Expand(int64_t first, const Matrix& values);

@@ -108,6 +108,7 @@ absl::Status PropagationOptions::Validate() const {
   }
   POLYEST_RETURN_IF_ERROR(CheckRange("density_bins", density_bins, 0, kMaxDensityBins));
   POLYEST_RETURN_IF_ERROR(CheckRange("density_samples", density_samples, 1, kMaxDensitySamples));
+  POLYEST_RETURN_IF_ERROR(CheckRange("draws", draws, kMinPriorDraws, kMaxPriorDraws));
   return CheckAtLeast("threads", threads, 1);
 }
 
@@ -124,8 +125,9 @@ absl::StatusOr<Propagation> PropagatePrior(const ResolvedProblem& problem,
                                             2 * static_cast<size_t>(options.density_bins));
   // A larger result needs a different tool, not more memory.
   POLYEST_RETURN_IF_ERROR(CheckAnswerSize(grid, columns.size(), numbers, kMaxPropagatedValues));
-  POLYEST_ASSIGN_OR_RETURN(const auto expansion,
-                           PriorExpansion::Make(problem, columns, options.threads, stop));
+  POLYEST_ASSIGN_OR_RETURN(
+      const auto expansion,
+      PriorExpansion::Make(problem, columns, options.draws, options.threads, stop));
   Propagation result = EmptyPropagation(problem, options, grid, columns);
   POLYEST_RETURN_IF_ERROR(expansion->Run(
       grid, [&](const ExpandedOutputs& expanded) { Describe(expanded, options, result); }, stop));

@@ -200,6 +200,7 @@ using namespace internal;
 
 absl::Status SensitivityOptions::Validate() const {
   POLYEST_RETURN_IF_ERROR((TimeGrid{until_s, step_s}.Validate()));
+  POLYEST_RETURN_IF_ERROR(CheckRange("draws", draws, kMinPriorDraws, kMaxPriorDraws));
   return CheckAtLeast("threads", threads, 1);
 }
 
@@ -216,8 +217,9 @@ absl::StatusOr<SensitivityAnalysis> AnalyzeSensitivity(const ResolvedProblem& pr
   const TimeGrid grid{options.until_s, options.step_s};
   POLYEST_RETURN_IF_ERROR(
       CheckAnswerSize(grid, columns.size(), 5 + 2 * problem.dimension(), kMaxPropagatedValues));
-  POLYEST_ASSIGN_OR_RETURN(const auto expansion,
-                           PriorExpansion::Make(problem, columns, options.threads, stop));
+  POLYEST_ASSIGN_OR_RETURN(
+      const auto expansion,
+      PriorExpansion::Make(problem, columns, options.draws, options.threads, stop));
   SensitivityAnalysis result = EmptyAnalysis(problem, grid, columns);
   const TermMasks masks(expansion->basis());
   Matrix model_variance(grid.count(), static_cast<Eigen::Index>(columns.size()));

@@ -24,6 +24,7 @@
 #include <vector>
 
 #include "polyest/diagnostic.h"
+#include "polyest/prior_propagation.h"
 #include "polyest/problem.h"
 #include "polyest/stop.h"
 #include "polyest/types.h"
@@ -39,7 +40,10 @@ struct SensitivityOptions {
   double until_s = 0;                // > 0: the last time
   double step_s = 0;                 // > 0; times are 0, step, 2 step … until
   std::vector<std::string> outputs;  // names; empty: the measured ones, or all if none is
-  int threads = 1;                   // ≥ 1; results do not depend on it
+  // Draws of the prior at which the expansion is compared with the model, kMinPriorDraws …
+  // kMaxPriorDraws.
+  int draws = kPriorDraws;
+  int threads = 1;  // ≥ 1; results do not depend on it
 
   // Returns OK, or INVALID_ARGUMENT with the field, the value and the rule.
   absl::Status Validate() const;

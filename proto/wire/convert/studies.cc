@@ -44,6 +44,7 @@ PropagationOptions ToPropagationOptions(const v1::ComputePropagationRequest& req
     options.probabilities.assign(request.probabilities().begin(), request.probabilities().end());
   }
   options.density_bins = request.density_bin_count();
+  if (request.draw_count() != 0) options.draws = request.draw_count();
   return options;
 }
 
@@ -90,6 +91,7 @@ SensitivityOptions ToSensitivityOptions(const v1::ComputeSensitivityRequest& req
   options.until_s = request.until_s();
   options.step_s = request.step_s() != 0 ? request.step_s() : request.until_s() / 100;
   options.outputs.assign(request.outputs().begin(), request.outputs().end());
+  if (request.draw_count() != 0) options.draws = request.draw_count();
   return options;
 }
 

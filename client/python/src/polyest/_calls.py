@@ -166,21 +166,23 @@ def compute_sweep(subject: Subject, *, lowest: float, highest: float,
 
 def compute_propagation(subject: Subject, *, until_s: float, step_s: float,
                         outputs: Sequence[str], probabilities: Sequence[float],
-                        density_bins: int) -> Call[results.Propagation]:
+                        density_bins: int, draws: int) -> Call[results.Propagation]:
     """What the prior predicts."""
     return Call(_methods.COMPUTE_PROPAGATION,
                 make(study_service_pb2.ComputePropagationRequest,
                      subject=subject, until_s=until_s, step_s=step_s, outputs=outputs,
-                     probabilities=probabilities, density_bin_count=density_bins),
+                     probabilities=probabilities, density_bin_count=density_bins,
+                     draw_count=draws),
                 prior.propagation_of)
 
 
 def compute_sensitivity(subject: Subject, *, until_s: float, step_s: float,
-                        outputs: Sequence[str]) -> Call[results.Sensitivity]:
+                        outputs: Sequence[str], draws: int) -> Call[results.Sensitivity]:
     """Which parameters the outputs depend on."""
     return Call(_methods.COMPUTE_SENSITIVITY,
                 make(study_service_pb2.ComputeSensitivityRequest,
-                     subject=subject, until_s=until_s, step_s=step_s, outputs=outputs),
+                     subject=subject, until_s=until_s, step_s=step_s, outputs=outputs,
+                     draw_count=draws),
                 prior.sensitivity_of)
 
 

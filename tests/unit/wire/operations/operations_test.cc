@@ -147,15 +147,18 @@ TEST(PropagationOptions, ComeFromTheRequest) {
   request.set_until_s(2);
   request.set_step_s(0.5);
   EXPECT_EQ(ToPropagationOptions(request).probabilities, (std::vector<double>{0.025, 0.5, 0.975}));
+  EXPECT_EQ(ToPropagationOptions(request).draws, 512);
   request.add_outputs("v");
   request.add_probabilities(0.3);
   request.set_density_bin_count(40);
+  request.set_draw_count(64);
   const PropagationOptions options = ToPropagationOptions(request);
   EXPECT_EQ(options.until_s, 2);
   EXPECT_EQ(options.step_s, 0.5);
   EXPECT_EQ(options.outputs, (std::vector<std::string>{"v"}));
   EXPECT_EQ(options.probabilities, (std::vector<double>{0.3}));
   EXPECT_EQ(options.density_bins, 40);
+  EXPECT_EQ(options.draws, 64);
 }
 
 TEST(CostGridOptions, ComeFromTheRequest) {
@@ -222,6 +225,19 @@ TEST(AnalyzeSensitivity, AnswersRowsOfTimesByParameters) {
   EXPECT_EQ(x.noise_std_dev_size(), 3);
   EXPECT_EQ(response->activity(0).parameter(), "a");
   EXPECT_EQ(response->expansion().order(), 3);
+}
+
+TEST(SensitivityOptions, ComeFromTheRequest) {
+  v1::ComputeSensitivityRequest request;
+  request.set_until_s(2);
+  EXPECT_EQ(ToSensitivityOptions(request).draws, 512);
+  request.add_outputs("v");
+  request.set_draw_count(64);
+  const SensitivityOptions options = ToSensitivityOptions(request);
+  EXPECT_EQ(options.until_s, 2);
+  EXPECT_EQ(options.step_s, 0.02);
+  EXPECT_EQ(options.outputs, (std::vector<std::string>{"v"}));
+  EXPECT_EQ(options.draws, 64);
 }
 
 TEST(AnalyzeSensitivity, TakesAHundredthOfUntilForTheStep) {

@@ -72,18 +72,20 @@ class Studies(Subjects):
                                                     highest=highest, points=points))
 
     async def propagate(self, until_s: float, step_s: float, *, outputs: Sequence[str] = (),
-                        probabilities: Sequence[float] = (), density_bins: int = 0
-                        ) -> results.Propagation:
+                        probabilities: Sequence[float] = (), density_bins: int = 0,
+                        draws: int = 0) -> results.Propagation:
         """Returns what the prior predicts at 0, step_s, 2 step_s … until_s, in s."""
         return await self._run(_calls.compute_propagation(
             self._subject(), until_s=until_s, step_s=step_s, outputs=outputs,
-            probabilities=probabilities, density_bins=density_bins))
+            probabilities=probabilities, density_bins=density_bins, draws=draws))
 
     async def sensitivity(self, until_s: float, *, step_s: float = 0,
-                          outputs: Sequence[str] = ()) -> results.Sensitivity:
+                          outputs: Sequence[str] = (), draws: int = 0
+                          ) -> results.Sensitivity:
         """Returns which parameters the outputs depend on, and when (Sobol' indices)."""
         return await self._run(_calls.compute_sensitivity(self._subject(), until_s=until_s,
-                                                          step_s=step_s, outputs=outputs))
+                                                          step_s=step_s, outputs=outputs,
+                                                          draws=draws))
 
     async def design(self, until_s: float, *, step_s: float = 0, samples: int = 0,
                      candidates: Optional[Candidates] = None,

@@ -269,6 +269,7 @@ TEST(Sensitivity, RefusalNamesFieldValueAndRule) {
               HasSubstr("step_s: 3 must be at most until 2"));
   EXPECT_THAT(refusal([](auto& o) { o.outputs = {"y"}; }), HasSubstr("outputs[0]"));
   EXPECT_THAT(refusal([](auto& o) { o.threads = 0; }), HasSubstr("threads: 0"));
+  EXPECT_THAT(refusal([](auto& o) { o.draws = -1; }), HasSubstr("draws: -1"));
   EXPECT_THAT(refusal([](auto& o) { o.step_s = 1e-9; }), HasSubstr("limit"));
 }
 
