@@ -136,9 +136,13 @@ void serialize(Archive& archive, DesignState& design) {
 }
 
 template <class Archive>
+void serialize(Archive& archive, TrajectoryState& state) {
+  archive(state.kept, state.failures, state.run, state.ensemble, state.previous, state.controls);
+}
+
+template <class Archive>
 void serialize(Archive& archive, ExpansionState& expansion) {
-  archive(expansion.design, expansion.noise, expansion.absorbed, expansion.kept, expansion.failures,
-          expansion.run, expansion.ensemble, expansion.previous, expansion.controls);
+  archive(expansion.design, expansion.noise, expansion.absorbed, expansion.trajectories);
 }
 
 template <class Archive>

@@ -54,9 +54,7 @@ class Substitution {
     state.design = StateOf(design);
     state.noise = present_.noise().ForNewExpansion();
     state.absorbed = Absorbed(design, error);
-    for (int q = 0; q < static_cast<int>(design.points.rows()); ++q) state.kept.push_back(q);
-    state.run = kept_.run;
-    POLYEST_RETURN_IF_ERROR(SetTrajectories(state));
+    POLYEST_ASSIGN_OR_RETURN(state.trajectories, Trajectories());
     return state;
   }
 
@@ -160,26 +158,30 @@ class Substitution {
     return moved;
   }
 
-  absl::Status SetTrajectories(ExpansionState& state) const {
-    for (const PreviousSample& sample : kept_.previous) {
+  absl::StatusOr<TrajectoryState> Trajectories() const {
+    const TrajectoryState& before = kept_.trajectories;
+    TrajectoryState state;
+    for (int q = 0; q < static_cast<int>(first_check_); ++q) state.kept.push_back(q);
+    state.run = before.run;
+    for (const PreviousSample& sample : before.previous) {
       PreviousSample& moved = state.previous.emplace_back(sample);
       Matrix outputs = sample.output;
       POLYEST_ASSIGN_OR_RETURN(outputs, AtNewPoints(outputs));
       moved.output = outputs.col(0);
     }
-    if (!kept_.ensemble) return absl::OkStatus();
-    const Matrix own = InterpolableStates(problem_, *kept_.ensemble);
+    if (!before.ensemble) return state;
+    const Matrix own = InterpolableStates(problem_, *before.ensemble);
     Matrix states(old_points() + old_controls(), own.cols());
     states.topRows(own.rows()) = own;
-    if (kept_.controls) {
-      states.bottomRows(old_controls()) = InterpolableStates(problem_, *kept_.controls);
+    if (before.controls) {
+      states.bottomRows(old_controls()) = InterpolableStates(problem_, *before.controls);
     }
     POLYEST_ASSIGN_OR_RETURN(const Matrix moved, AtNewPoints(states));
-    state.ensemble = WithInterpolated(problem_, *kept_.ensemble, moved.topRows(phi_.rows()));
+    state.ensemble = WithInterpolated(problem_, *before.ensemble, moved.topRows(phi_.rows()));
     if (controls_ > 0) {
-      state.controls = WithInterpolated(problem_, *kept_.controls, moved.bottomRows(controls_));
+      state.controls = WithInterpolated(problem_, *before.controls, moved.bottomRows(controls_));
     }
-    return absl::OkStatus();
+    return state;
   }
 
   const ResolvedProblem& problem_;

@@ -46,7 +46,8 @@ absl::Status Refusal(const ResolvedProblem& problem, const RegionalExpansion& pr
   const auto valid = [](const std::vector<bool>& flags) {
     return std::ranges::count(flags, false) == 0;
   };
-  if (std::ssize(kept.kept) != present.points() || !present.failures().empty() ||
+  const TrajectoryState& trajectories = kept.trajectories;
+  if (std::ssize(trajectories.kept) != present.points() || !present.failures().empty() ||
       !valid(kept.absorbed.check_valid) || !valid(kept.absorbed.control_valid)) {
     return Refused("trajectories have failed");
   }
@@ -54,8 +55,8 @@ absl::Status Refusal(const ResolvedProblem& problem, const RegionalExpansion& pr
   if (std::ranges::any_of(kept.absorbed.profiles, learned)) {
     return Refused("the correlation of noise is being learned");
   }
-  if ((kept.ensemble && !AreSmooth(*kept.ensemble)) ||
-      (kept.controls && !AreSmooth(*kept.controls))) {
+  if ((trajectories.ensemble && !AreSmooth(*trajectories.ensemble)) ||
+      (trajectories.controls && !AreSmooth(*trajectories.controls))) {
     return Refused("the states are not smooth");
   }
   return absl::OkStatus();
@@ -99,7 +100,7 @@ absl::StatusOr<Inherited> Judge(const ResolvedProblem& problem, const RegionalEx
   Inherited inherited{.error = ErrorIn(design, present, kept.absorbed)};
   const double max_error = max_shift * max_shift * present.noise().misfit;
   if (!(inherited.error <= max_error)) return Refused("the sums are not accurate enough");
-  if (!kept.ensemble) return inherited;
+  if (!kept.trajectories.ensemble) return inherited;
   if (rows - kept.absorbed.rows < RowsToJudge(problem)) {
     return Refused("too few rows tell how accurate the states are");
   }

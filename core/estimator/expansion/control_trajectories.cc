@@ -2,22 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <vector>
 
 #include "core/common/linear_algebra.h"
-#include "core/common/status.h"
-#include "core/propagation/ensemble_propagator.h"
 
 namespace polyest::internal {
 namespace {
 
-// A block of so few trajectories takes as long as a block of one.
-constexpr Eigen::Index kMaxControls = kLanes;
-// The tolerance must leave room for one of at most half its size.
-constexpr double kLeastControllable = 2 * kLeastTolerance;
-// A tenth of the tolerance takes at most ten times the steps, with a method of order 1.
-constexpr int kMoreSteps = 10;
 constexpr double kControlWeight = 1e-3;     // that counts, relative to the heaviest check point
 constexpr double kLeastEigenvalue = 1e-14;  // relative to the largest
 
@@ -83,56 +74,17 @@ double IntegrationShift(const RegionalExpansion& expansion, const Cost& cost) {
   return largest;
 }
 
-int RegionalExpansion::CountControls() const {
-  const Problem& problem = problem_.problem();
-  const Model& model = *problem.model;
-  if (!HasCheckpointsInRuns(model) || model.description().states.empty()) return 0;
-  if (problem.integration.relative_tolerance < kLeastControllable || StepsExactly()) return 0;
-  return static_cast<int>(std::min(kMaxControls, design_.check_points.rows()));
-}
-
-// Starts the first check points once more, with a smaller tolerance.
-void RegionalExpansion::StartControls(int run) {
-  if (controls_ == 0) return;
-  EnsembleSpecification specification = problem_.MakeEnsemble(
-      thetas_.middleRows(points(), controls_), problem_.outputs(), threads_, run);
-  IntegrationOptions& integration = specification.integration;
-  integration.relative_tolerance =
-      std::max(kLeastTolerance, kControlTolerance * integration.relative_tolerance);
-  const int most = std::numeric_limits<int>::max();
-  integration.max_steps =
-      integration.max_steps > most / kMoreSteps ? most : kMoreSteps * integration.max_steps;
-  if (problem_.uses_filters()) {
-    control_filters_ = std::make_unique<FilterBank>(std::move(specification), &inputs_->signals());
-    return;
-  }
-  control_propagator_ =
-      std::make_unique<EnsemblePropagator>(std::move(specification), &inputs_->signals());
-}
-
-// Advances all trajectories over rows of the block that are of the present run.
-absl::Status RegionalExpansion::Advance(int first, int count, const Stop& stop) {
-  std::vector<double> times;
-  for (int k = first; k < first + count; ++k) {
-    times.push_back(block_.rows[static_cast<size_t>(k)].time_s);
-  }
-  auto outputs = outputs_.middleCols(first * channels_, count * channels_);
-  POLYEST_RETURN_IF_ERROR(propagator_->Advance(times, outputs.topRows(thetas_.rows()), stop));
-  if (controls_ == 0) return absl::OkStatus();
-  return control_propagator_->Advance(times, outputs.bottomRows(controls_), stop);
-}
-
 // Compares the check points' own trajectories with the expansion at one sample.
 void RegionalExpansion::Compare(int column, double z, double variance) {
   const int channel = column % channels_;
-  for (Eigen::Index i = 0; i < check_phi_.rows(); ++i) {
+  for (int i = 0; i < trajectories_.checks(); ++i) {
     if (!absorbed_.check_valid[static_cast<size_t>(i)]) continue;
-    const double y = outputs_(points() + i, column);
+    const double y = block_.outputs(points() + i, column);
     if (!std::isfinite(y)) {
       absorbed_.check_valid[static_cast<size_t>(i)] = false;
       continue;
     }
-    const double difference = y - check_predictions_(i, column);
+    const double difference = y - block_.check_predictions(i, column);
     absorbed_.check_chi_squared(i, channel) += (z - y) * (z - y) / variance;
     absorbed_.check_residual[i] += difference * difference / variance;
   }
@@ -149,14 +101,16 @@ RegionalExpansion::Check RegionalExpansion::Checks() const {
 // Adds c_k δ_k/R_k of one sample.
 void RegionalExpansion::CompareControls(int column, double variance) {
   const int channel = column % channels_;
-  for (int i = 0; i < controls_; ++i) {
-    const double difference = outputs_(thetas_.rows() + i, column) - outputs_(points() + i, column);
+  const auto outputs = block_.outputs.col(column);
+  const int first = points() + trajectories_.checks();
+  for (int i = 0; i < controls(); ++i) {
+    const double difference = outputs[first + i] - outputs[points() + i];
     if (!std::isfinite(difference)) {
       absorbed_.control_valid[static_cast<size_t>(i)] = false;
       continue;
     }
     absorbed_.control_scores.col(i * channels_ + channel) +=
-        (difference / variance) * coefficients_.col(column);
+        (difference / variance) * block_.coefficients.col(column);
   }
 }
 

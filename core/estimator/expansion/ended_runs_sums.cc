@@ -56,12 +56,14 @@ void RegionalExpansion::TakeEndedRuns() {
   const Matrix terms = TermsAt(*ended, design_.region, shared, design_.points);
   Matrix transfer(design_.basis->size(), terms.cols());
   Vector residual(terms.cols());
-  matrix_.Solve(terms, transfer, residual);
+  CollocationMatrix matrix = trajectories_.matrix();
+  matrix.Solve(terms, transfer, residual);
   // d_ended = φ_ended − φ_ended(0) = Mᵀd + δ
   const Vector shift = transfer.transpose() * reference_phi_ - TermsAtCentre(*ended);
   Vector ratio(channels_);
-  Matrix point_phi;
+  Matrix point_phi, check_phi;
   design_.basis->EvaluateMany(design_.points, point_phi);
+  design_.basis->EvaluateMany(design_.check_points, check_phi);
   for (int c = 0; c < channels_; ++c) {
     const auto channel = static_cast<size_t>(c);
     const double scale = noise_.channels[channel].scale / ended->noise_scale[c];
@@ -72,9 +74,9 @@ void RegionalExpansion::TakeEndedRuns() {
     sums.differences = before.differences.Substituted(transfer, shift, ratio[c]);
     sums.surplus = SurplusAt(*ended, problem_.problem().measured[channel].noise, channel, ratio[c]);
     sums.spent = before.spent;
-    for (Eigen::Index i = 0; i < check_phi_.rows(); ++i) {
+    for (Eigen::Index i = 0; i < check_phi.rows(); ++i) {
       absorbed_.check_chi_squared(i, c) =
-          sums.samples.ChiSquared(check_phi_.row(i).transpose() - reference_phi_);
+          sums.samples.ChiSquared(check_phi.row(i).transpose() - reference_phi_);
     }
     for (Eigen::Index q = 0; q < point_phi.rows(); ++q) {
       absorbed_.point_chi_squared(q, c) =

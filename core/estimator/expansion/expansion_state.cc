@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <optional>
 #include <utility>
 
 #include "core/common/infeasible.h"
 #include "core/common/linear_algebra.h"
 #include "core/common/status.h"
+#include "core/estimator/expansion/inconsistent_state.h"
 #include "core/estimator/expansion/likelihood_power.h"
 #include "core/estimator/problem/truncation.h"
 
@@ -141,15 +141,6 @@ bool HasSizesOf(const AbsorbedRows& state, const AbsorbedRows& fresh, bool has_w
          std::isfinite(state.carried_rate) && AreOfFew(state.few, fresh.few, terms);
 }
 
-bool IsAscendingBelow(const std::vector<int>& numbers, int end) {
-  return std::ranges::adjacent_find(numbers, std::ranges::greater_equal()) == numbers.end() &&
-         (numbers.empty() || (numbers.front() >= 0 && numbers.back() < end));
-}
-
-absl::Status Inconsistent(const char* what) {
-  return absl::DataLossError(absl::StrCat("the snapshot's ", what, " cannot be of this problem"));
-}
-
 }  // namespace
 
 DesignState StateOf(const ExpansionDesign& design) {
@@ -161,7 +152,7 @@ DesignState StateOf(const ExpansionDesign& design) {
 }
 
 absl::StatusOr<ExpansionDesign> DesignOf(const ResolvedProblem& problem, DesignState state) {
-  if (!IsDesignFor(problem, state)) return Inconsistent("expansion");
+  if (!IsDesignFor(problem, state)) return InconsistentState("expansion");
   const auto n = static_cast<size_t>(problem.dimension());
   ExpansionDesign design;
   design.region = Region(std::move(state.centre), std::move(state.axes));
@@ -186,102 +177,44 @@ ExpansionState RegionalExpansion::State() const {
   state.design = StateOf(design_);
   state.noise = noise_;
   state.absorbed = absorbed_;
-  state.kept = kept_;
-  state.failures = failures_;
-  state.run = run_;
-  if (propagator_) state.ensemble = propagator_->State();
-  if (control_propagator_) state.controls = control_propagator_->State();
-  if (filters_) state.ensemble = filters_->State();
-  if (control_filters_) state.controls = control_filters_->State();
-  state.previous = whitening_.State();
+  state.trajectories = trajectories_.State();
   return state;
 }
 
 absl::StatusOr<std::unique_ptr<RegionalExpansion>> RegionalExpansion::FromState(
     const ResolvedProblem& problem, ExpansionState state, const SampleStore& store, int threads,
     const Stop& stop) {
-  if (!IsNoiseOf(problem, state.noise)) return Inconsistent("noise");
+  if (!IsNoiseOf(problem, state.noise)) return InconsistentState("noise");
   POLYEST_ASSIGN_OR_RETURN(ExpansionDesign design, DesignOf(problem, std::move(state.design)));
   absl::StatusOr<std::unique_ptr<RegionalExpansion>> expansion =
       Make(problem, &store, std::move(design), std::move(state.noise), threads, stop);
-  if (IsInfeasible(expansion.status())) return Inconsistent("collocation points");
+  if (IsInfeasible(expansion.status())) return InconsistentState("collocation points");
   POLYEST_RETURN_IF_ERROR(expansion.status());
-  (*expansion)->next_row_ = state.absorbed.rows;
-  if (state.ensemble) POLYEST_RETURN_IF_ERROR((*expansion)->RestoreRun(state, store));
-  POLYEST_RETURN_IF_ERROR((*expansion)->RestoreFit(state, stop));
+  FittedTrajectories& trajectories = (*expansion)->trajectories_;
+  const int64_t rows = state.absorbed.rows;
+  trajectories.BeginAt(rows);
+  if (state.trajectories.ensemble) {
+    POLYEST_RETURN_IF_ERROR(trajectories.RestoreRun(state.trajectories, rows, store));
+  }
+  POLYEST_RETURN_IF_ERROR((*expansion)->RestoreSums(std::move(state.absorbed)));
+  POLYEST_RETURN_IF_ERROR(trajectories.RestoreFit(std::move(state.trajectories), stop));
   return expansion;
 }
 
-// Restores the run to its state after the absorbed rows.
-absl::Status RegionalExpansion::RestoreRun(const ExpansionState& state, const SampleStore& store) {
-  const int64_t rows = state.absorbed.rows;
-  const int64_t samples = state.ensemble->samples;
-  if (samples < 1 || samples > rows || rows > store.rows() || state.run < 0 ||
-      (problem_.per_run() && state.run >= problem_.runs())) {
-    return Inconsistent("run");
-  }
-  const int64_t begin = rows - samples;
-  POLYEST_RETURN_IF_ERROR(store.Read(rows - 1, 1, block_));
-  const SampleRow last = block_.rows.front();
-  POLYEST_RETURN_IF_ERROR(store.Read(begin, 1, block_));
-  if (last.run != state.run || block_.rows.front().run != state.run ||
-      last.time_s != state.ensemble->time_s) {
-    return absl::FailedPreconditionError("the rows appended are not those of the snapshot");
-  }
-  const double reach_s = InputReach(state.run);
-  int64_t first_knots = begin;
-  if (reach_s < kInfinity) {
-    POLYEST_ASSIGN_OR_RETURN(first_knots,
-                             RowOfFirstKnots(problem_, store, begin, rows, last.time_s - reach_s));
-  }
-  StartRun(state.run, begin, first_knots);
-  POLYEST_RETURN_IF_ERROR(inputs_->ReadUpTo(last.time_s));
-  if (!inputs_->SettledFor(last.time_s)) {
-    return absl::FailedPreconditionError(
-        "the rows that settle the inputs at the snapshot have not been appended");
-  }
-  const bool controls_fit =
-      controls_ == 0 || (state.controls && state.controls->samples == samples &&
-                         state.controls->time_s == last.time_s &&
-                         (control_filters_ ? control_filters_->Restore(*state.controls)
-                                           : control_propagator_->Restore(*state.controls)));
-  const bool fits = controls_fit && (filters_ ? filters_->Restore(*state.ensemble)
-                                              : propagator_->Restore(*state.ensemble));
-  return fits ? absl::OkStatus() : Inconsistent("ensemble");
-}
-
-// Restores the parts of the fit, the noise and the sums that the absorbed rows determine.
-absl::Status RegionalExpansion::RestoreFit(ExpansionState& state, const Stop& stop) {
+absl::Status RegionalExpansion::RestoreSums(AbsorbedRows state) {
   const bool has_windows = problem_.ended_runs() == nullptr;
-  if (!HasSizesOf(state.absorbed, absorbed_, has_windows)) return Inconsistent("sums");
+  if (!HasSizesOf(state, absorbed_, has_windows)) return InconsistentState("sums");
   for (size_t c = 0; c < absorbed_.sums.size(); ++c) {
     // The flags of the channel's noise are kept, since they do not come from the rows.
     ChannelSums sums = absorbed_.sums[c];
-    sums.samples = std::move(state.absorbed.sums[c].samples);
-    sums.differences = std::move(state.absorbed.sums[c].differences);
-    sums.log_variance = std::move(state.absorbed.sums[c].log_variance);
-    sums.log_variance_at_reference = state.absorbed.sums[c].log_variance_at_reference;
-    sums.surplus = state.absorbed.sums[c].surplus;
-    state.absorbed.sums[c] = std::move(sums);
+    sums.samples = std::move(state.sums[c].samples);
+    sums.differences = std::move(state.sums[c].differences);
+    sums.log_variance = std::move(state.sums[c].log_variance);
+    sums.log_variance_at_reference = state.sums[c].log_variance_at_reference;
+    sums.surplus = state.sums[c].surplus;
+    state.sums[c] = std::move(sums);
   }
-  absorbed_ = std::move(state.absorbed);
-  for (const PreviousSample& sample : state.previous) {
-    if (sample.output.size() != thetas_.rows() + controls_) return Inconsistent("correlated noise");
-  }
-  if (state.previous.size() != absorbed_.sums.size()) return Inconsistent("correlated noise");
-  whitening_.Restore(std::move(state.previous));
-  for (const FailedTrajectory& failure : state.failures) {
-    if (failure.theta.size() != thetas_.cols()) return Inconsistent("failed trajectories");
-  }
-  failures_ = std::move(state.failures);
-  if (!IsAscendingBelow(state.kept, points())) return Inconsistent("collocation points");
-  if (std::ssize(state.kept) == points()) return absl::OkStatus();
-  kept_ = std::move(state.kept);
-  const Matrix left = design_.points(kept_, Eigen::all);
-  absl::StatusOr<CollocationMatrix> matrix = CollocationMatrix::Factor(*design_.basis, left, stop);
-  if (IsInfeasible(matrix.status())) return Inconsistent("collocation points");
-  POLYEST_RETURN_IF_ERROR(matrix.status());
-  matrix_ = *std::move(matrix);
+  absorbed_ = std::move(state);
   return absl::OkStatus();
 }
 

@@ -5,11 +5,9 @@
 // from the rest: the basis, the parameters of the trajectories, and the factors of the collocation
 // matrix.
 
-#include <optional>
 #include <vector>
 
 #include "core/estimator/expansion/regional_expansion.h"
-#include "core/propagation/trajectory_ensemble.h"
 
 namespace polyest::internal {
 
@@ -35,13 +33,7 @@ struct ExpansionState {
   DesignState design;
   LearnedNoise noise;
   AbsorbedRows absorbed{0, 0, 0, 0, 0};
-  std::vector<int> kept;
-  std::vector<FailedTrajectory> failures;
-  // These describe the middle of a run; they are empty if a new run begins.
-  int run = 0;
-  std::optional<EnsembleState> ensemble;
-  std::optional<EnsembleState> controls;  // present if `ensemble` is and there are controls
-  std::vector<PreviousSample> previous;   // one per channel
+  TrajectoryState trajectories;
 };
 
 }  // namespace polyest::internal

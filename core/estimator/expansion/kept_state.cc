@@ -25,10 +25,10 @@ int64_t KeptRows(const std::shared_ptr<const ExpansionState>& state) {
 int RegionalExpansion::RowsToKeptState(const RowBlock& block) const {
   const int64_t interval = Interval(problem_);
   const bool inside = problem_.has_checkpoints_in_runs();
-  int64_t kept = KeptRows(kept_state_), begin = run_begin_;
-  int run = run_;
+  int64_t kept = KeptRows(kept_state_), begin = trajectories_.run_begin();
+  int run = trajectories_.run();
   for (int k = 0; k < block.count(); ++k) {
-    const int64_t row = next_row_ + k;
+    const int64_t row = trajectories_.next_row() + k;
     const bool begins = block.rows[static_cast<size_t>(k)].run != run;
     const bool due = begins ? row - kept >= interval : inside && (row - begin) % interval == 0;
     if (due && k > 0) return k;
@@ -40,28 +40,22 @@ int RegionalExpansion::RowsToKeptState(const RowBlock& block) const {
   return block.count();
 }
 
-// Returns the time before the present one from which trajectories of the run may need the inputs,
-// +∞ if they may need them from its beginning.
-double RegionalExpansion::InputReach(int run) const {
-  if (problem_.streamed_inputs().empty() || !problem_.has_checkpoints_in_runs()) return kInfinity;
-  return LargestInputDelay(problem_.MakeEnsemble(thetas_, problem_.outputs(), threads_, run));
-}
-
 // Keeps the present state if it is one that can be gone on from. `next_run` is the run of the next
 // row.
 void RegionalExpansion::KeepState(int next_run) {
-  if (absorbed_.rows != next_row_ || next_row_ == problem_.first_row()) return;
-  const bool begins = next_run != run_;
+  const int64_t rows = trajectories_.next_row();
+  if (absorbed_.rows != rows || rows == problem_.first_row()) return;
+  const bool begins = next_run != trajectories_.run();
   const int64_t interval = Interval(problem_);
-  const bool due =
-      begins ? next_row_ - KeptRows(kept_state_) >= interval
-             : problem_.has_checkpoints_in_runs() && (next_row_ - run_begin_) % interval == 0;
-  if (!due || KeptRows(kept_state_) == next_row_) return;
+  const bool due = begins ? rows - KeptRows(kept_state_) >= interval
+                          : problem_.has_checkpoints_in_runs() &&
+                                (rows - trajectories_.run_begin()) % interval == 0;
+  if (!due || KeptRows(kept_state_) == rows) return;
   ExpansionState state = State();
   if (begins) {
-    state.ensemble.reset();
-    state.controls.reset();
-  } else if (!state.ensemble) {
+    state.trajectories.ensemble.reset();
+    state.trajectories.controls.reset();
+  } else if (!state.trajectories.ensemble) {
     return;
   }
   kept_state_ = std::make_shared<const ExpansionState>(std::move(state));

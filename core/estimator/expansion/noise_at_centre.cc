@@ -23,21 +23,20 @@ void RegionalExpansion::Linearize() {
   }
 }
 
-// Sets the noise of the fitted rows from `first` on to that of the prediction, where it is
-// relative. Such a channel is white, so that its rows are as they were measured.
-void RegionalExpansion::PredictNoise(int first) {
-  const size_t width = block_.values.size() / block_.rows.size();
+// Sets the noise of the block's fitted rows to that of the prediction, where it is relative. Such a
+// channel is white, so that its rows are as they were measured.
+void RegionalExpansion::PredictNoise() {
   for (int c = 0; c < channels_; ++c) {
     const ChannelNoise& noise = noise_.channels[static_cast<size_t>(c)];
     if (!noise.of_prediction) continue;
     const NoiseModel& model = problem_.problem().measured[static_cast<size_t>(c)].noise;
-    for (int row = first; row < fitted_rows_; ++row) {
-      double& sigma = block_.noise[static_cast<size_t>(row * channels_ + c)];
+    for (int row = 0; row < block_.fitted_rows; ++row) {
+      const int column = block_.Column(row, c);
+      double& sigma = block_.rows.noise[static_cast<size_t>(column)];
       if (sigma <= 0) continue;  // no sample
-      const double z = block_.values[static_cast<size_t>(row) * width + static_cast<size_t>(c)];
       double& largest = absorbed_.largest[c];
-      largest = std::max(largest, std::abs(z));
-      const double y = coefficients_.col(row * channels_ + c).dot(linearized_phi_);
+      largest = std::max(largest, std::abs(block_.Value(row, c)));
+      const double y = block_.coefficients.col(column).dot(linearized_phi_);
       sigma = noise.scale * model.StandardDeviation(y, largest);
     }
   }
@@ -64,7 +63,7 @@ ScoredSample RegionalExpansion::Scored(int channel, const ConstVectorRef& coeffi
 // What filters predict is not linear enough in the parameters of its variance.
 void RegionalExpansion::AddToBlocks(int channel, const ConstVectorRef& coefficients, double z,
                                     double variance) {
-  if (filters_) return;
+  if (problem_.uses_filters()) return;
   const double unit = 1 / std::sqrt(variance);
   slope_.noalias() = unit * (linearized_gradient_.transpose() * coefficients);
   absorbed_.blocks[static_cast<size_t>(channel)].Add(
@@ -76,11 +75,11 @@ void RegionalExpansion::AddToProfile(int row, int channel, const ConstVectorRef&
                                      double z, double variance) {
   CorrelationProfile& profile = absorbed_.profiles[static_cast<size_t>(channel)];
   if (profile.empty()) return;
-  const double sigma = block_.noise[static_cast<size_t>(row * channels_ + channel)];
+  const double sigma = block_.Noise(row, channel);
   slope_.noalias() = (linearized_gradient_.transpose() * coefficients) / sigma;
   // The whitening must be undone with the noise that it was done with; the weight comes after it.
-  profile.Add(block_.rows[static_cast<size_t>(row)].time_s, slope_,
-              (z - coefficients.dot(linearized_phi_)) / sigma, sigma * sigma / variance);
+  profile.Add(block_.Row(row).time_s, slope_, (z - coefficients.dot(linearized_phi_)) / sigma,
+              sigma * sigma / variance);
 }
 
 }  // namespace polyest::internal

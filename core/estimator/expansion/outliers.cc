@@ -35,7 +35,7 @@ double RegionalExpansion::DeviationFromCentre(int channel, const ConstVectorRef&
 void RegionalExpansion::CountOutlier(int channel, const ConstVectorRef& coefficients, double z,
                                      double variance, double deviation) {
   const auto c = static_cast<size_t>(channel);
-  if (filters_) {
+  if (problem_.uses_filters()) {
     const bool tailed = IsTailed(channel) && FilteredOutlierWeight(deviation) < kOutlierWeight;
     if (tailed) ++absorbed_.outliers[c];
     return;
@@ -106,7 +106,7 @@ void RegionalExpansion::AddToFew(int channel, int column, double z, double noise
   SampleBySample& few = *absorbed_.few;
   RobustSamples& kept = few.channels[static_cast<size_t>(channel)];
   const OutlierHandling outliers = kept.outliers();
-  const double sigma = block_.noise[static_cast<size_t>(column)];
+  const double sigma = block_.rows.noise[static_cast<size_t>(column)];
   // The normalization of weighted samples is that of the sums (Normalize).
   const NoiseModel& model = problem_.problem().measured[static_cast<size_t>(channel)].noise;
   double normal = VarianceFactor(model.outliers) * sigma * sigma;
@@ -114,26 +114,26 @@ void RegionalExpansion::AddToFew(int channel, int column, double z, double noise
     noise = normal = sigma * sigma;
     lack = LackOfDensity(outliers);
   }
-  const double own_error = residual_variance_[column] / noise_.misfit_of_weights;
+  const double own_error = block_.residual_variance[column] / noise_.misfit_of_weights;
   const double variance = noise + own_error;
   few.log_noise += 0.5 * std::log(normal) + lack;
   few.log_variance += 0.5 * std::log(normal + own_error) + lack;
-  few.own_error += residual_variance_[column] / variance + absorbed_.carried_rate;
+  few.own_error += block_.residual_variance[column] / variance + absorbed_.carried_rate;
   const auto chi_squared = [&](double y, double scale) {
     return 2 * RobustLoss(outliers, (z - y) / std::sqrt(scale));
   };
-  for (Eigen::Index i = 0; i < check_phi_.rows(); ++i) {
+  for (int i = 0; i < trajectories_.checks(); ++i) {
     if (!absorbed_.check_valid[static_cast<size_t>(i)]) continue;
-    const double y = outputs_(points() + i, column);
-    const double difference = y - check_predictions_(i, column);
+    const double y = block_.outputs(points() + i, column);
+    const double difference = y - block_.check_predictions(i, column);
     few.check_chi_squared(i, channel) += chi_squared(y, noise);
     few.check_residual[i] += difference * difference / noise;
   }
   for (Eigen::Index q = 0; q < points(); ++q) {
-    few.point_chi_squared(q, channel) += chi_squared(outputs_(q, column), variance);
+    few.point_chi_squared(q, channel) += chi_squared(block_.outputs(q, column), variance);
   }
   if (outliers == OutlierHandling::kNone) return;
-  const auto coefficients = coefficients_.col(column);
+  const auto coefficients = block_.coefficients.col(column);
   kept.Add(coefficients, z - coefficients.dot(reference_phi_), variance);
   const int64_t count = std::accumulate(
       few.channels.begin(), few.channels.end(), int64_t{0},

@@ -1,38 +1,15 @@
 #include "core/estimator/expansion/regional_expansion.h"
 
-#include <absl/strings/str_format.h>
-
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "core/bayes/noise.h"
 #include "core/common/check.h"
-#include "core/common/infeasible.h"
 #include "core/common/linear_algebra.h"
 #include "core/common/status.h"
 #include "core/estimator/expansion/population_of_runs.h"
-#include "core/propagation/linear_system.h"
 
 namespace polyest::internal {
-namespace {
-
-Matrix Stack(const Matrix& top, const Matrix& bottom) {
-  Matrix stacked(top.rows() + bottom.rows(), top.cols());
-  stacked << top, bottom;
-  return stacked;
-}
-
-// Returns the parameters of the collocation points, followed by those of the check points.
-Matrix ParametersOf(const ResolvedProblem& problem, const ExpansionDesign& design) {
-  Matrix points = design.region.ManyToGerm(Stack(design.points, design.check_points));
-  for (Eigen::Index i = 0; i < points.rows(); ++i) {
-    points.row(i) = problem.prior().ToParameters(points.row(i).transpose()).transpose();
-  }
-  return points;
-}
-
-}  // namespace
 
 AbsorbedRows::AbsorbedRows(int terms, int channels, Eigen::Index points, Eigen::Index check_points,
                            int controls)
@@ -64,28 +41,19 @@ RegionalExpansion::RegionalExpansion(const ResolvedProblem& problem, const Sampl
                                      ExpansionDesign design, LearnedNoise noise,
                                      CollocationMatrix matrix, int threads)
     : problem_(problem),
-      store_(store),
       design_(std::move(design)),
       noise_(std::move(noise)),
-      matrix_(std::move(matrix)),
       threads_(threads),
       channels_(problem.channels()),
       reference_phi_(design_.basis->size()),
-      thetas_(ParametersOf(problem_, design_)),
-      kept_(static_cast<size_t>(design_.points.rows())),
-      controls_(CountControls()),
-      whitening_(noise_.channels, thetas_.rows() + controls_),
-      absorbed_(design_.basis->size(), channels_, design_.points.rows(),
-                design_.check_points.rows(), controls_),
+      trajectories_(problem_, store, design_, noise_.channels, std::move(matrix), threads),
+      absorbed_(design_.basis->size(), channels_, trajectories_.points(), trajectories_.checks(),
+                trajectories_.controls()),
       difference_(design_.basis->size()) {
   POLYEST_CHECK(static_cast<int>(noise_.channels.size()) == channels_);
-  std::iota(kept_.begin(), kept_.end(), 0);
   design_.basis->Evaluate(design_.reference, reference_phi_);
   if (design_.in_tails) prior_moments_ = MomentsUnderPrior(problem_.prior(), design_);
-  design_.basis->EvaluateMany(design_.check_points, check_phi_);
-  check_basis_ = PackedMatrix(check_phi_);
   BeginSums();
-  next_row_ = problem_.first_row();
   LookFromPosterior();
   Linearize();
   TakeEndedRuns();
@@ -133,116 +101,19 @@ void RegionalExpansion::LookFromPosterior() {
   spread_ = phi_gradient * Inverse(design_.region.axes()) * noise_.posterior.factor;
 }
 
-// Each run begins at t = 0 from the initial states, with its own inputs, whose knots are read from
-// the row `first_knots` on.
-void RegionalExpansion::StartRun(int run, int64_t first_row, int64_t first_knots) {
-  run_ = run;
-  run_begin_ = first_row;
-  whitening_.BeginRun();
-  propagator_.reset();
-  control_propagator_.reset();
-  filters_.reset();
-  control_filters_.reset();
-  inputs_ = std::make_unique<RunInputs>(problem_, store_, run, first_knots);
-  input_reach_s_ = InputReach(run);
-  if (problem_.uses_filters()) return StartFilters(run);
-  propagator_ = std::make_unique<EnsemblePropagator>(
-      problem_.MakeEnsemble(thetas_, problem_.outputs(), threads_, run), &inputs_->signals());
-  StartControls(run);
-}
-
-bool RegionalExpansion::StepsExactly() const {
-  const InputSignals inputs = problem_.MakeInputs();
-  return internal::StepsExactly(problem_.MakeEnsemble(thetas_, problem_.outputs(), threads_,
-                                                      std::max(run_, problem_.first_run())),
-                                inputs);
-}
-
 absl::Status RegionalExpansion::Propagate(const RowBlock& block, const Stop& stop) {
   KeepState(block.rows.front().run);
-  block_ = block;
-  fitted_rows_ = 0;
-  outputs_.resize(thetas_.rows() + controls_, channels_ * block.count());
-  coefficients_.resize(design_.basis->size(), channels_ * block.count());
-  residual_variance_.resize(channels_ * block.count());
-  check_predictions_.resize(check_phi_.rows(), channels_ * block.count());
-  for (int first = 0; first < block.count() && fitted_rows_ == first;) {
-    int count = 1;
-    const int run = block.rows[static_cast<size_t>(first)].run;
-    while (first + count < block.count() &&
-           block.rows[static_cast<size_t>(first + count)].run == run) {
-      ++count;
-    }
-    if (run != run_) StartRun(run, next_row_, next_row_);
-    POLYEST_RETURN_IF_ERROR(PropagateRun(first, count, stop));
-    first += count;
-    next_row_ += count;
-  }
+  POLYEST_RETURN_IF_ERROR(trajectories_.Propagate(block, block_, stop));
+  PredictNoise();
   return absl::OkStatus();
-}
-
-absl::Status RegionalExpansion::PropagateRun(int first, int count, const Stop& stop) {
-  const double last_s = block_.rows[static_cast<size_t>(first + count - 1)].time_s;
-  POLYEST_RETURN_IF_ERROR(inputs_->ReadUpTo(last_s));
-  POLYEST_RETURN_IF_ERROR(filters_ ? AdvanceFilters(first, count, stop)
-                                   : Advance(first, count, stop));
-  if (input_reach_s_ < kInfinity) inputs_->Forget(last_s - input_reach_s_);
-  whitening_.Apply(first, count, block_, outputs_.middleCols(first * channels_, count * channels_));
-  POLYEST_RETURN_IF_ERROR(FitRows(first, count, stop));
-  AddDelayErrors(first);
-  PredictNoise(first);
-  return absl::OkStatus();
-}
-
-// Whether a trajectory still in the fit has no output at this row of the block.
-bool RegionalExpansion::FailsAt(int row) const {
-  const auto values = outputs_.block(0, row * channels_, points(), channels_);
-  if (values.allFinite()) return false;
-  for (const int q : kept_) {
-    if (!values.row(q).allFinite()) return true;
-  }
-  return false;
-}
-
-// Leaves out the trajectories without output at this row, and factors the remaining collocation
-// points again.
-absl::Status RegionalExpansion::DropFailed(int row, const Stop& stop) {
-  if (!FailsAt(row)) return absl::OkStatus();
-  NoteFailures(row);
-  const auto values = outputs_.block(0, row * channels_, points(), channels_);
-  std::erase_if(kept_, [&](int q) { return !values.row(q).allFinite(); });
-  const int needed = design_.basis->size() + (problem_.problem().expansion.adaptive ? 1 : 0);
-  if (static_cast<int>(kept_.size()) < needed) {
-    return InfeasibleError(absl::StrFormat(
-        "only %d of %d trajectories could be integrated to t = %g s and the expansion needs %d; "
-        "the last to fail: %s",
-        kept_.size(), points(), block_.rows[static_cast<size_t>(row)].time_s, needed,
-        failures_.empty() ? "not known" : DescribeFailure(failures_.back(), problem_.prior())));
-  }
-  const Matrix left = design_.points(kept_, Eigen::all);
-  POLYEST_ASSIGN_OR_RETURN(matrix_, CollocationMatrix::Factor(*design_.basis, left, stop));
-  return absl::OkStatus();
-}
-
-// Records each trajectory that fails at this row once. The propagator may be ahead of the row and
-// report later failures too.
-void RegionalExpansion::NoteFailures(int row) {
-  const std::vector<PointFailure>& failures =
-      filters_ ? filters_->failures() : propagator_->failures();
-  for (const PointFailure& failure : failures) {
-    const bool kept = std::binary_search(kept_.begin(), kept_.end(), failure.point);
-    if (!kept || outputs_.block(failure.point, row * channels_, 1, channels_).allFinite()) continue;
-    failures_.push_back({thetas_.row(failure.point).transpose(), run_, failure.time_s, failure.flag,
-                         failure.reason});
-  }
 }
 
 double RegionalExpansion::ResidualToNoise(int row) const {
   double worst = 0;
   for (int c = 0; c < channels_; ++c) {
-    const double noise = block_.noise[static_cast<size_t>(row * channels_ + c)];
+    const double noise = block_.Noise(row, c);
     if (noise > 0) {
-      worst = std::max(worst, std::sqrt(residual_variance_[row * channels_ + c]) / noise);
+      worst = std::max(worst, std::sqrt(block_.residual_variance[block_.Column(row, c)]) / noise);
     }
   }
   return worst;
@@ -257,13 +128,12 @@ Vector RegionalExpansion::TermWeights() const {
 // With polynomials that are orthonormal under the prior, an output cᵀφ has the mean c_0 and the
 // variance Σ c_s² over s ≥ 1 (12). Over the tails they are not, and it has those of φ.
 std::optional<PriorPrediction> RegionalExpansion::PredictionOf(int row, int channel) const {
-  const double sigma = block_.noise[static_cast<size_t>(row * channels_ + channel)];
+  const double sigma = block_.Noise(row, channel);
   if (!(design_.whole_prior || design_.in_tails) || sigma <= 0) return std::nullopt;
-  const size_t width = block_.values.size() / block_.rows.size();
-  const int column = row * channels_ + channel;
-  const auto coefficients = coefficients_.col(column);
+  const int column = block_.Column(row, channel);
+  const auto coefficients = block_.coefficients.col(column);
   PriorPrediction prediction;
-  prediction.value = block_.values[static_cast<size_t>(row) * width + static_cast<size_t>(channel)];
+  prediction.value = block_.Value(row, channel);
   if (design_.in_tails) {
     prediction.mean = coefficients.dot(prior_moments_.mean);
     prediction.variance = coefficients.dot(prior_moments_.covariance * coefficients);
@@ -271,18 +141,18 @@ std::optional<PriorPrediction> RegionalExpansion::PredictionOf(int row, int chan
     prediction.mean = coefficients[0];
     prediction.variance = coefficients.tail(coefficients.size() - 1).squaredNorm();
   }
-  prediction.variance += residual_variance_[column];
+  prediction.variance += block_.residual_variance[column];
   prediction.noise = sigma;
   if (!std::isfinite(prediction.variance) || !std::isfinite(prediction.mean)) return std::nullopt;
   return prediction;
 }
 
 double RegionalExpansion::Magnitude(int row, int channel) const {
-  return row < fitted_rows_ ? coefficients_.col(row * channels_ + channel).norm() : 0;
+  return row < block_.fitted_rows ? block_.coefficients.col(block_.Column(row, channel)).norm() : 0;
 }
 
 void RegionalExpansion::Absorb(int row) {
-  const int run = block_.rows[static_cast<size_t>(row)].run;
+  const auto [run, time_s] = block_.Row(row);
   if (run != absorbed_.summed_run) {
     EndRunOfSums();
     absorbed_.summed_run = run;
@@ -290,29 +160,29 @@ void RegionalExpansion::Absorb(int row) {
   }
   for (int c = 0; c < channels_; ++c) AbsorbSample(row, c);
   if (problem_.ended_runs() == nullptr) {
-    absorbed_.windows.EndRow(absorbed_.sums, run, block_.rows[static_cast<size_t>(row)].time_s);
+    absorbed_.windows.EndRow(absorbed_.sums, run, time_s);
   }
   ++absorbed_.rows;
-  absorbed_.propagated += thetas_.rows() + controls_;
+  absorbed_.propagated += trajectories_.count();
 }
 
 void RegionalExpansion::AbsorbSample(int row, int c) {
-  const size_t width = block_.values.size() / block_.rows.size();
-  const double sigma = block_.noise[static_cast<size_t>(row * channels_ + c)];
+  const double sigma = block_.Noise(row, c);
   if (sigma <= 0) return;  // no sample
-  double z = block_.values[static_cast<size_t>(row) * width + static_cast<size_t>(c)];
-  const int column = row * channels_ + c;
-  const double own_error = residual_variance_[column] / noise_.misfit_of_weights;
-  const auto coefficients = coefficients_.col(column);
+  double z = block_.Value(row, c);
+  const int column = block_.Column(row, c);
+  const double own_error = block_.residual_variance[column] / noise_.misfit_of_weights;
+  const auto coefficients = block_.coefficients.col(column);
   const NoiseModel& model = problem_.problem().measured[static_cast<size_t>(c)].noise;
   const double deviation = DeviationFromCentre(c, coefficients, z, sigma * sigma + own_error);
   // Filters handle outliers themselves.
-  const OutlierHandling outliers = filters_ ? OutlierHandling::kNone : model.outliers;
+  const OutlierHandling outliers =
+      problem_.uses_filters() ? OutlierHandling::kNone : model.outliers;
   const double weight = OutlierWeight(outliers, deviation);
   // e = z − cᵀφ_0,  R = σ²/w + ρ
   double noise = VarianceFactor(outliers) * sigma * sigma / weight;
-  double lack =
-      filters_ && IsTailed(c) ? LackOfDensity(model.outliers) : LackOfWeight(outliers, deviation);
+  double lack = problem_.uses_filters() && IsTailed(c) ? LackOfDensity(model.outliers)
+                                                       : LackOfWeight(outliers, deviation);
   if (IsScored(c)) {
     const ScoredSample scored = Scored(c, coefficients, z, noise, own_error);
     z = scored.value;
@@ -332,17 +202,17 @@ void RegionalExpansion::AbsorbSample(int row, int c) {
   Compare(column, z, noise);
   CompareControls(column, variance);
   if (absorbed_.few) AddToFew(c, column, z, noise, lack);
-  if (filters_) AddLogVariance(column, noise, variance);
+  if (problem_.uses_filters()) AddLogVariance(column, noise, variance);
   // χ²_q += (z − y_q)²/R
   absorbed_.point_chi_squared.col(c).array() +=
-      (outputs_.col(column).head(points()).array() - z).square() / variance;
+      (block_.outputs.col(column).head(points()).array() - z).square() / variance;
   ++absorbed_.samples;
 }
 
 // Adds what of the variance is the expansion's own error: `own_error` as it is discounted.
 void RegionalExpansion::AddOwnError(int channel, int column, double own_error, double variance) {
   absorbed_.discount[channel] += own_error / variance;
-  absorbed_.own_error += residual_variance_[column] / variance + absorbed_.carried_rate;
+  absorbed_.own_error += block_.residual_variance[column] / variance + absorbed_.carried_rate;
   absorbed_.carried_error += absorbed_.carried_rate;
 }
 

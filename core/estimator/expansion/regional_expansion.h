@@ -1,8 +1,8 @@
 #pragma once
 
-// An expansion that advances along the record. It holds the ensemble of trajectories, the
-// coefficients c_k = A⁺ Y_k (10) of every measured output at every sample time, and the mismatch
-// sums that result. Memory does not grow with the number of samples.
+// An expansion that advances along the record. It holds the trajectories and their fit
+// (fitted_trajectories.h), and the mismatch sums that result. Memory does not grow with the number
+// of samples.
 //
 // The expansion's own error is treated as noise: a sample enters the sums with R = σ² + ρ, ρ being
 // the residual variance of the fit at its time. A region that is still too wide thus gives a
@@ -13,11 +13,9 @@
 // While they are few, the samples of channels with outliers and known noise are kept besides, and
 // their likelihood is that of each sample (bayes/robust_samples.h).
 //
-// Where the likelihood is that of prediction errors (polyest/problem.h), each point runs a filter
-// (propagation/filter_bank.h), and what is expanded is the whitened innovation w = ν/√S and
-// log(S/σ²). In the sums the innovations take the place of the residuals: y_k stands for z_k − σ_k
-// w_k. The variances add ½ Σ log(S_k/σ_k²), discounted as their samples are by σ²/R. Outliers are
-// handled by the filters (propagation/heavy_tail.h), whose w and log S/σ² are those of Student's t.
+// Where the likelihood is that of prediction errors (polyest/problem.h), the variances add
+// ½ Σ log(S_k/σ_k²), discounted as their samples are by σ²/R. Outliers are handled by the filters
+// (propagation/heavy_tail.h), whose w and log S/σ² are those of Student's t.
 
 #include <absl/status/statusor.h>
 
@@ -27,27 +25,17 @@
 
 #include "core/bayes/mismatch.h"
 #include "core/bayes/relative_noise.h"
-#include "core/chaos/collocation_matrix.h"
-#include "core/chaos/packed_matrix.h"
 #include "core/estimator/expansion/absorbed_rows.h"
 #include "core/estimator/expansion/expansion_design.h"
-#include "core/estimator/expansion/failed_trajectory.h"
+#include "core/estimator/expansion/fitted_block.h"
+#include "core/estimator/expansion/fitted_trajectories.h"
 #include "core/estimator/record/data_facts.h"
 #include "core/estimator/record/learned_noise.h"
-#include "core/estimator/record/run_inputs.h"
-#include "core/estimator/record/whitening.h"
-#include "core/propagation/filter_bank.h"
 #include "polyest/samples.h"
 
 namespace polyest::internal {
 
 struct ExpansionState;
-
-// Expansions of the means and the standard deviations of filters' states, S × states each.
-struct FilteredStates {
-  Matrix mean;
-  Matrix deviation;
-};
 
 class RegionalExpansion {
  public:
@@ -75,8 +63,8 @@ class RegionalExpansion {
   // are left at the next one; shortage() then explains why. Only a stop request or an error of the
   // store returns an error; the expansion is then unusable.
   absl::Status Propagate(const RowBlock& block, const Stop& stop);
-  int fitted_rows() const { return fitted_rows_; }
-  const absl::Status& shortage() const { return shortage_; }
+  int fitted_rows() const { return block_.fitted_rows; }
+  const absl::Status& shortage() const { return trajectories_.shortage(); }
   // Returns, for row `row` of the block propagated last, the expansion's residual in units of the
   // noise: the largest over the channels with a sample.
   double ResidualToNoise(int row) const;
@@ -92,7 +80,7 @@ class RegionalExpansion {
   // Adds the row to the sums. Rows are absorbed in order, each once.
   void Absorb(int row);
   // Sets the row of the store that is the first to be propagated; no row has been yet.
-  void BeginAt(int64_t row) { next_row_ = row; }
+  void BeginAt(int64_t row) { trajectories_.BeginAt(row); }
   // Returns how many rows of a block that follows the rows propagated, at least one, to propagate
   // with the next call so that it ends where a state can be kept.
   int RowsToKeptState(const RowBlock& block) const;
@@ -110,14 +98,14 @@ class RegionalExpansion {
   const LearnedNoise& noise() const { return noise_; }
   void set_misfit(double misfit) { noise_.misfit = misfit; }
   // Whether its trajectories are stepped without error of integration (linear_system.h).
-  bool StepsExactly() const;
-  int points() const { return static_cast<int>(design_.points.rows()); }
+  bool StepsExactly() const { return trajectories_.StepsExactly(); }
+  int points() const { return trajectories_.points(); }
   int64_t absorbed_rows() const { return absorbed_.rows; }
   // Returns the number of trajectories × rows.
   int64_t propagated_rows() const { return absorbed_.propagated; }
-  const std::vector<FailedTrajectory>& failures() const { return failures_; }
+  const std::vector<FailedTrajectory>& failures() const { return trajectories_.failures(); }
   // Returns the indices of the collocation points that are still in the fit, ascending.
-  const std::vector<int>& kept_points() const { return kept_; }
+  const std::vector<int>& kept_points() const { return trajectories_.kept(); }
 
   // Returns the sums of each measured channel, over all runs.
   const std::vector<ChannelSums>& sums() const { return absorbed_.sums; }
@@ -136,7 +124,7 @@ class RegionalExpansion {
   double LogVarianceError() const;
   // Returns the expansions of the filters' states after the rows propagated; nothing without
   // filters or before the first row.
-  std::optional<FilteredStates> Filtered() const;
+  std::optional<FilteredStates> Filtered() const { return trajectories_.Filtered(); }
   // Returns the sums of blocks of a channel's residuals, linearized at LinearizedAt(); without any
   // block where filters predict.
   const ResidualBlocks& Blocks(int channel) const {
@@ -184,7 +172,7 @@ class RegionalExpansion {
   Check Checks() const;
 
   // Returns the number K of control trajectories, the i-th for the i-th check point.
-  int controls() const { return controls_; }
+  int controls() const { return trajectories_.controls(); }
   // Whether the i-th control trajectory and its check point's could be integrated.
   bool IsControlValid(int i) const { return absorbed_.control_valid[static_cast<size_t>(i)]; }
   // Returns Σ c_k δ_k/R_k (S) of a channel, δ_k the i-th control's output minus its check point's.
@@ -197,36 +185,14 @@ class RegionalExpansion {
                     ExpansionDesign design, LearnedNoise noise, CollocationMatrix matrix,
                     int threads);
 
-  // Runs and the states kept between their rows (kept_state.cc, expansion_state.cc).
-  void StartRun(int run, int64_t first_row, int64_t first_knots);
+  // The states kept between rows (kept_state.cc, expansion_state.cc).
   void KeepState(int next_run);
-  double InputReach(int run) const;
-  absl::Status RestoreFit(ExpansionState& state, const Stop& stop);
-  absl::Status RestoreRun(const ExpansionState& state, const SampleStore& store);
-
-  // Trajectories, or filters in their place, and their controls (control_trajectories.cc,
-  // filtered_samples.cc).
-  absl::Status PropagateRun(int first, int count, const Stop& stop);
-  absl::Status Advance(int first, int count, const Stop& stop);
-  int CountControls() const;
-  void StartControls(int run);
-  void StartFilters(int run);
-  absl::Status AdvanceFilters(int first, int count, const Stop& stop);
-  void SubstituteInnovations(int first, int count);
-
-  // The fit of what they give, without those that have failed (fitted_rows.cc).
-  absl::Status FitRows(int first, int count, const Stop& stop);
-  void FitColumns(int first, int count, const Matrix& all_values, Matrix& coefficients,
-                  Vector& residual);
-  void AddDelayErrors(int first);
-  bool FailsAt(int row) const;
-  absl::Status DropFailed(int row, const Stop& stop);
-  void NoteFailures(int row);
+  absl::Status RestoreSums(AbsorbedRows state);
 
   // Noise and outliers as the posterior's centre tells them (noise_at_centre.cc, outliers.cc).
   void LookFromPosterior();
   void Linearize();
-  void PredictNoise(int first);
+  void PredictNoise();
   bool IsScored(int channel) const;
   bool IsTailed(int channel) const {
     return problem_.problem().measured[static_cast<size_t>(channel)].noise.outliers !=
@@ -264,47 +230,16 @@ class RegionalExpansion {
   void CompareControls(int column, double variance);
 
   const ResolvedProblem& problem_;
-  const SampleStore* store_;
   ExpansionDesign design_;
   PriorMoments prior_moments_;  // empty unless the design is in the prior's tails
   LearnedNoise noise_;
-  CollocationMatrix matrix_;
   int threads_;
   int channels_;
   Vector reference_phi_;
-  Matrix check_phi_;          // C × S
-  PackedMatrix check_basis_;  // the same
-
-  Matrix thetas_;          // (Q + C) × n
-  std::vector<int> kept_;  // collocation points that are still in the fit
-  int run_ = -1;
-  int64_t run_begin_ = 0;  // row of the store at which the present run began
-  int64_t next_row_ = 0;   // of the store: the first row not propagated
+  FittedTrajectories trajectories_;
+  FittedBlock block_;  // propagated last
   std::shared_ptr<const ExpansionState> kept_state_;
-  int controls_;                       // K
-  std::unique_ptr<RunInputs> inputs_;  // of the present run
-  double input_reach_s_ = 0;           // how far back its trajectories may need the inputs
-  std::unique_ptr<EnsemblePropagator> propagator_;
-  std::unique_ptr<EnsemblePropagator> control_propagator_;  // null without controls
-  // In place of the propagators where the likelihood is that of prediction errors; else null.
-  std::unique_ptr<FilterBank> filters_;
-  std::unique_ptr<FilterBank> control_filters_;  // null without controls, too
-  std::vector<FailedTrajectory> failures_;
 
-  // The block propagated last.
-  RowBlock block_;
-  Matrix outputs_;            // (Q + C + K) × (m · rows)
-  Matrix coefficients_;       // S × (m · rows)
-  Vector residual_variance_;  // m · rows
-  Matrix check_predictions_;  // of the outputs at the check points, C × (m · rows)
-  // With filters, as those above: log(S/σ²), its coefficients and the residual variance of its fit.
-  Matrix log_variances_;
-  Matrix log_variance_coefficients_;
-  Vector log_variance_residual_;
-  int fitted_rows_ = 0;
-  absl::Status shortage_;
-
-  Whitening whitening_;
   // Outliers are judged at φ(η̂), where η̂ is the posterior's centre, relative to the posterior's
   // own spread: an output cᵀφ has the variance ‖spread_ᵀ c‖² there.
   Vector centre_phi_;

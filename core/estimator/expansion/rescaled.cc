@@ -109,8 +109,9 @@ absl::StatusOr<std::unique_ptr<RegionalExpansion>> Rescaled(
       return InfeasibleError("the expansion is not accurate enough");
     }
     Divide(*factors, state.absorbed);
-    for (size_t c = 0; c < state.previous.size(); ++c) {
-      state.previous[c].noise *= std::sqrt((*factors)[static_cast<Eigen::Index>(c)]);
+    std::vector<PreviousSample>& previous = state.trajectories.previous;
+    for (size_t c = 0; c < previous.size(); ++c) {
+      previous[c].noise *= std::sqrt((*factors)[static_cast<Eigen::Index>(c)]);
     }
   }
   state.absorbed.propagated = 0;

@@ -26,7 +26,8 @@ class StatePairs {
              const ExpansionState& kept, const SampleStore& store, int threads)
       : problem_(problem),
         store_(store),
-        kept_(kept),
+        kept_(kept.trajectories),
+        kept_rows_(kept.absorbed.rows),
         design_(present.design()),
         noise_(present.noise()),
         threads_(threads) {}
@@ -38,7 +39,7 @@ class StatePairs {
     PairComparison comparison;
     int64_t samples = 0;
     Vector sums = Vector::Zero(checks());
-    for (int64_t first = kept_.absorbed.rows; first < rows; first += kRowsToRead) {
+    for (int64_t first = kept_rows_; first < rows; first += kRowsToRead) {
       POLYEST_RETURN_IF_ERROR(store_.Read(first, std::min(kRowsToRead, rows - first), block));
       const int count = RowsOfRun(block);
       if (count == 0) break;
@@ -84,10 +85,9 @@ class StatePairs {
     }
     EnsembleSpecification specification =
         problem_.MakeEnsemble(thetas, problem_.outputs(), threads_, kept_.run);
-    const int64_t rows = kept_.absorbed.rows;
     POLYEST_ASSIGN_OR_RETURN(
         const int64_t first,
-        RowOfFirstKnots(problem_, store_, rows - kept_.ensemble->samples, rows,
+        RowOfFirstKnots(problem_, store_, kept_rows_ - kept_.ensemble->samples, kept_rows_,
                         kept_.ensemble->time_s - LargestInputDelay(specification)));
     inputs_.emplace(problem_, &store_, kept_.run, first);
     POLYEST_RETURN_IF_ERROR(inputs_->ReadUpTo(kept_.ensemble->time_s));
@@ -141,7 +141,8 @@ class StatePairs {
 
   const ResolvedProblem& problem_;
   const SampleStore& store_;
-  const ExpansionState& kept_;
+  const TrajectoryState& kept_;
+  const int64_t kept_rows_;  // of the record, after which they were kept
   const ExpansionDesign& design_;
   const LearnedNoise& noise_;
   int threads_;
