@@ -11,7 +11,7 @@ absl::StatusOr<SharedLibrary> SharedLibrary::Load(const std::string& path, std::
   void* const handle = dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL);
   if (handle != nullptr) return SharedLibrary(handle, std::move(what));
   const char* const reason = dlerror();
-  return absl::FailedPreconditionError(
+  return absl::UnavailableError(
       absl::StrCat(what, " cannot be loaded: ", reason == nullptr ? "no reason" : reason));
 }
 

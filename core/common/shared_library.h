@@ -14,7 +14,8 @@ namespace polyest::internal {
 class SharedLibrary {
  public:
   // Loads a library, given by its path or the name that the loader looks for; `what` names it in
-  // errors. Returns FailedPrecondition with the loader's message if that fails.
+  // errors. Returns Unavailable with the loader's message if that fails: the file may be gone, or
+  // one that it needs.
   static absl::StatusOr<SharedLibrary> Load(const std::string& path, std::string what);
 
   // Sets `function` to the library's function of that name. Returns FailedPrecondition if there is

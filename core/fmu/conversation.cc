@@ -3,6 +3,9 @@
 #include <absl/strings/str_cat.h>
 #include <poll.h>
 
+#include <algorithm>
+#include <array>
+
 #include "core/common/status.h"
 #include "core/external/clean_text.h"
 
@@ -11,6 +14,11 @@ namespace {
 
 // Interval between two checks of the stop request and of the workers' progress.
 constexpr int kLookMs = 20;
+// A worker's error is one of the model (FailedPrecondition) or of its surroundings, which says
+// nothing of the parameters that it was computed for.
+constexpr std::array kCodesOfWorkers = {
+    absl::StatusCode::kOk, absl::StatusCode::kFailedPrecondition, absl::StatusCode::kUnavailable,
+    absl::StatusCode::kResourceExhausted, absl::StatusCode::kInternal};
 
 }  // namespace
 
@@ -67,9 +75,11 @@ absl::StatusOr<ResultMessage> ReadResult(const std::string& fmu, WorkerProcess& 
     sound = sound && failure.point >= 0 && failure.point < rows;
     failure.reason = CleanText(failure.reason);
   }
-  if (!sound) return DamagedAnswer(fmu);
-  if (result.error.empty()) return result;
-  return absl::FailedPreconditionError(absl::StrCat("fmu ", fmu, ": ", CleanText(result.error)));
+  const auto code = static_cast<absl::StatusCode>(result.code);
+  if (!sound || std::ranges::find(kCodesOfWorkers, code) == kCodesOfWorkers.end())
+    return DamagedAnswer(fmu);
+  if (code == absl::StatusCode::kOk) return result;
+  return absl::Status(code, absl::StrCat("fmu ", fmu, ": ", CleanText(result.error)));
 }
 
 }  // namespace polyest::internal

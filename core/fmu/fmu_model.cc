@@ -48,6 +48,13 @@ absl::Status UnpackInto(const std::filesystem::path& file, UnpackedFmu& fmu) {
   return archive->Unpack(fmu.folder->path());
 }
 
+// Whether the folder still has the library: what cleans up temporary folders may have removed it.
+bool IsThere(const UnpackedFmu& fmu) {
+  std::error_code error;
+  return std::filesystem::exists(fmu.folder->path() / LibraryPath(fmu.description.interface),
+                                 error);
+}
+
 }  // namespace
 
 absl::StatusOr<std::shared_ptr<const FmuModel>> FmuModel::Read(const std::filesystem::path& file,
@@ -62,7 +69,7 @@ absl::StatusOr<std::shared_ptr<const FmuModel>> FmuModel::Read(const std::filesy
 
 std::shared_ptr<const UnpackedFmu> FmuModel::Unpack() const {
   const std::lock_guard lock(mutex_);
-  if (unpacked_ != nullptr) return unpacked_;
+  if (unpacked_ != nullptr && IsThere(*unpacked_)) return unpacked_;
   auto fmu = std::make_shared<UnpackedFmu>();
   fmu->description = description_;
   fmu->status = Annotate(description_.interface.name, UnpackInto(file_, *fmu));

@@ -63,7 +63,9 @@ struct EvaluateMessage {
 using RequestMessage = std::variant<AdvanceMessage, EvaluateMessage>;
 
 struct ResultMessage {
-  std::string error;  // an error that ended the whole simulation, or empty
+  // An error that ended the whole simulation: absl::StatusCode and the message; 0 without one.
+  int code = 0;
+  std::string error;
   // After AdvanceMessage: rows as in StartMessage, columns as in TrajectoryEnsemble::Advance. After
   // EvaluateMessage: the values, rows as there.
   Matrix outputs;
@@ -141,7 +143,7 @@ void Fields(Archive& archive, EvaluateMessage& evaluate) {
 }
 template <class Archive>
 void Fields(Archive& archive, ResultMessage& result) {
-  archive(result.error, result.outputs, result.failures);
+  archive(result.code, result.error, result.outputs, result.failures);
 }
 
 // Returns a message as bytes.

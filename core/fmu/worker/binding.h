@@ -1,8 +1,7 @@
 #pragma once
 
 // An instance of an FMU, independent of the FMI version. Each function calls the corresponding FMI
-// function and returns its status as the standard numbers them: 0 OK, 1 warning, 2 discard, 3
-// error, 4 fatal.
+// function and returns its status.
 
 #include <absl/status/statusor.h>
 
@@ -16,6 +15,9 @@
 
 namespace polyest::internal {
 
+// The statuses as both versions of the standard number them. An FMU may return any other number.
+inline constexpr int kFmuOk = 0, kFmuWarning = 1, kFmuDiscard = 2, kFmuError = 3, kFmuFatal = 4;
+
 struct EventUpdate {
   bool again = false;      // whether the discrete states need another iteration
   bool terminate = false;  // whether the FMU requests the end of the simulation
@@ -24,7 +26,7 @@ struct EventUpdate {
 };
 
 // Receives the messages that an FMU logs.
-using FmuLog = std::function<void(int status, const std::string& message)>;
+using FmuLog = std::function<void(const std::string& message)>;
 
 class Binding {
  public:

@@ -88,7 +88,7 @@ std::string FileUri(const std::string& path) {
 }
 
 // FMI 2.0 formats messages by printf's conventions.
-[[gnu::format(printf, 5, 6)]] void LogMessage(void* environment, const char*, fmi2::Status status,
+[[gnu::format(printf, 5, 6)]] void LogMessage(void* environment, const char*, fmi2::Status,
                                               const char*, const char* message, ...) {
   if (environment == nullptr || message == nullptr) return;
   char text[512];
@@ -96,7 +96,7 @@ std::string FileUri(const std::string& path) {
   va_start(arguments, message);
   std::vsnprintf(text, sizeof(text), message, arguments);
   va_end(arguments);
-  (*static_cast<const FmuLog*>(environment))(status, text);
+  (*static_cast<const FmuLog*>(environment))(text);
 }
 
 class Fmi2Binding final : public Binding {
@@ -116,7 +116,7 @@ class Fmi2Binding final : public Binding {
 
   int EnterInitialization(double tolerance) override {
     const int status = f_.setup_experiment(component_, 1, tolerance, 0, 0, 0);
-    return status > 1 ? status : f_.enter_initialization(component_);
+    return status > kFmuWarning ? status : f_.enter_initialization(component_);
   }
   int ExitInitialization() override { return f_.exit_initialization(component_); }
   int Set(std::span<const FmuVariable> variables, const double* values) override {

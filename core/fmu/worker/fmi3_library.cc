@@ -69,9 +69,9 @@ absl::Status BindCoSimulation(const SharedLibrary& library, Functions& f) {
   return library.Bind("fmi3DoStep", f.do_step);
 }
 
-void LogMessage(void* environment, fmi3::Status status, const char*, const char* message) {
+void LogMessage(void* environment, fmi3::Status, const char*, const char* message) {
   if (environment == nullptr || message == nullptr) return;
-  (*static_cast<const FmuLog*>(environment))(status, message);
+  (*static_cast<const FmuLog*>(environment))(message);
 }
 
 class Fmi3Binding final : public Binding {
@@ -138,8 +138,7 @@ class Fmi3Binding final : public Binding {
     const int status = f_.do_step(instance_, time_s, step_s, true, &event_needed, &terminate,
                                   &early_return, &last_time_s);
     // A step that ended early without permission counts as not done.
-    constexpr int kDiscard = 2;
-    return early_return && status < kDiscard ? kDiscard : status;
+    return early_return && status < kFmuDiscard ? kFmuDiscard : status;
   }
 
  private:

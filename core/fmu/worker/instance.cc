@@ -11,20 +11,17 @@
 namespace polyest::internal {
 namespace {
 
-constexpr int kWarning = 1;
-constexpr int kDiscard = 2;
-constexpr int kError = 3;
 constexpr int kMaxEventIterations = 1'000;
 
-bool IsGood(int status) { return status == 0 || status == kWarning; }
+bool IsGood(int status) { return status == kFmuOk || status == kFmuWarning; }
 
 const char* StatusInWords(int status) {
   switch (status) {
-    case 2:
+    case kFmuDiscard:
       return "discarded it";
-    case 3:
+    case kFmuError:
       return "reported an error";
-    case 4:
+    case kFmuFatal:
       return "reported a fatal error";
     default:
       return "answered with a status that is none";
@@ -49,7 +46,7 @@ Instance::~Instance() {
 bool Instance::CheckFinite(std::span<const double> values) {
   factory_.said.clear();
   const auto is_finite = [](double value) { return std::isfinite(value); };
-  return std::ranges::all_of(values, is_finite) || Fail(kError, kParametersNotFinite);
+  return std::ranges::all_of(values, is_finite) || Fail(kFmuError, kParametersNotFinite);
 }
 
 bool Instance::Instantiate() {
@@ -59,14 +56,14 @@ bool Instance::Instantiate() {
     const std::string name = absl::StrCat(factory_.interface.name, "_", point_);
     factory_.said.clear();
     own_ = factory_.library->Instantiate(name, &factory_.log);
-    if (own_ == nullptr) return Fail(kError, "the FMU refused to be instantiated");
+    if (own_ == nullptr) return Fail(kFmuError, "the FMU refused to be instantiated");
   }
   binding_ = own_.get();
   if (shares) {
     if (own_ != nullptr) factory_.shared = std::move(own_);
     binding_ = factory_.shared.get();
-    if (factory_.untouched == nullptr && binding_->SaveState(&factory_.untouched) > kWarning) {
-      return Fail(kError, "the FMU could not save its state");
+    if (factory_.untouched == nullptr && binding_->SaveState(&factory_.untouched) > kFmuWarning) {
+      return Fail(kFmuError, "the FMU could not save its state");
     }
   }
   factory_.monitor->Leave();
@@ -80,12 +77,12 @@ bool Instance::Activate() {
   factory_.monitor->Enter(FmuCall::kState, point_, time_s_);
   Instance* const other = factory_.active;
   factory_.active = nullptr;
-  if (other != nullptr && !other->broken_ && binding_->SaveState(&other->state_) > kWarning) {
-    other->Fail(kError, "the FMU could not save its state");
+  if (other != nullptr && !other->broken_ && binding_->SaveState(&other->state_) > kFmuWarning) {
+    other->Fail(kFmuError, "the FMU could not save its state");
   }
   void* const state = state_ == nullptr ? factory_.untouched : state_;
-  if (binding_->RestoreState(state) > kWarning) {
-    return Fail(kError, "the FMU could not restore its state");
+  if (binding_->RestoreState(state) > kFmuWarning) {
+    return Fail(kFmuError, "the FMU could not restore its state");
   }
   factory_.active = this;
   return true;
@@ -106,7 +103,7 @@ bool Instance::Do(FmuCall kind, Call call) {
 bool Instance::Fail(int status, const std::string& what) {
   failure_ = factory_.said.empty() ? what : absl::StrCat(what, ": ", factory_.said);
   failure_status_ = status;
-  broken_ = broken_ || status != kDiscard;
+  broken_ = broken_ || status != kFmuDiscard;
   return false;
 }
 
@@ -134,11 +131,11 @@ bool Instance::IterateEvents() {
   do {
     update = {};
     if (++iterations > kMaxEventIterations) {
-      return Fail(kError, absl::StrCat("an event is not settled after ", kMaxEventIterations,
-                                       " iterations"));
+      return Fail(kFmuError, absl::StrCat("an event is not settled after ", kMaxEventIterations,
+                                          " iterations"));
     }
     if (!Do(FmuCall::kEvents, [&] { return binding_->UpdateDiscreteStates(update); })) return false;
-    if (update.terminate) return Fail(kError, "the FMU asked for the end of the simulation");
+    if (update.terminate) return Fail(kFmuError, "the FMU asked for the end of the simulation");
   } while (update.again);
   next_event_s_ = update.next_time_defined ? update.next_time_s : kInfinity;
   return Do(FmuCall::kEvents, [&] { return binding_->EnterContinuousTime(); });
@@ -200,7 +197,7 @@ bool Instance::CompletedStep(bool& event) {
   if (!Do(FmuCall::kEvents, [&] { return binding_->CompletedStep(event, terminate); })) {
     return false;
   }
-  return !terminate || Fail(kError, "the FMU asked for the end of the simulation");
+  return !terminate || Fail(kFmuError, "the FMU asked for the end of the simulation");
 }
 
 bool Instance::HandleEvent() {
@@ -219,7 +216,7 @@ bool Instance::DoStep(double time_s, double step_s) {
     return false;
   }
   time_s_ = time_s + step_s;
-  return !terminate || Fail(kError, "the FMU asked for the end of the simulation");
+  return !terminate || Fail(kFmuError, "the FMU asked for the end of the simulation");
 }
 
 }  // namespace polyest::internal

@@ -136,6 +136,7 @@ ResultMessage Answer(Simulation* simulation, const absl::Status& started,
   }
   if (status.ok()) return result;
   ResultMessage failed;
+  failed.code = static_cast<int>(status.code());
   failed.error = std::string(status.message());
   return failed;
 }

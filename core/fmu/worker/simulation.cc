@@ -70,7 +70,7 @@ Simulation::Simulation(StartMessage start, InputSignals signals,
   factory_.relative_tolerance = start_.integration.relative_tolerance;
   factory_.library = library_.get();
   factory_.monitor = monitor;
-  factory_.log = [this](int, const std::string& message) {
+  factory_.log = [this](const std::string& message) {
     factory_.said = message;
     factory_.monitor->Say(message);
   };

@@ -102,6 +102,28 @@ TEST_F(FaultyFmu, WithoutAFunctionIsRefused) {
               HasSubstr("has no function fmi2DoStep"));
 }
 
+// Temporary files of a daemon that runs for weeks may be cleaned up under it.
+TEST_F(FaultyFmu, WhoseFilesWereRemovedIsUnpackedAgain) {
+  FmuEnsemble ensemble("faulty_cs2", 1, {"x"});
+  const Matrix before = ensemble.Propagate({0.25});
+  for (const auto& folder : std::filesystem::directory_iterator(temporary_)) {
+    std::filesystem::remove_all(folder);
+  }
+  EXPECT_EQ(ensemble.Propagate({0.25}), before);
+}
+
+// Were it FailedPrecondition, a session would leave out the rows of which that says nothing.
+TEST_F(FaultyFmu, WhoseLibraryCannotBeLoadedIsUnavailable) {
+  FmuEnsemble ensemble("faulty_cs2", 1, {"x"});
+  ensemble.Propagate({0.25});
+  for (const auto& file : std::filesystem::recursive_directory_iterator(temporary_)) {
+    if (file.path().extension() == ".so") std::ofstream(file.path()) << "no library";
+  }
+  const absl::Status status = ensemble.TryPropagate({0.25}).status();
+  EXPECT_EQ(status.code(), absl::StatusCode::kUnavailable);
+  EXPECT_THAT(status.message(), HasSubstr("fmu faulty_cs2: its library cannot be loaded"));
+}
+
 // Propagates three points. The middle one fails at 0.3 s, or earlier if a step led there.
 void ExpectOneFailure(const char* fmu, const char* fault, const char* reason,
                       bool sees_ahead = false) {
