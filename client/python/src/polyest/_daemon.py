@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import signal
+import stat
 import subprocess
 import tempfile
 import weakref
@@ -21,7 +22,8 @@ def find_program(given: Union[str, os.PathLike[str], None]) -> str:
     """Returns the path of `polyestd`.
 
     It is the given one, else that of the environment variable POLYEST_DAEMON, else the one in PATH,
-    else the newest one that was built in the checkout around the package or the working folder.
+    else the newest one that was built in the checkout around the package or the working folder, if
+    that is the user's own.
     Raises Unavailable.
     """
     named = given or os.environ.get("POLYEST_DAEMON")
@@ -34,12 +36,21 @@ def find_program(given: Union[str, os.PathLike[str], None]) -> str:
     if found is not None:
         return found
     built = [program for place in (Path(__file__).resolve(), Path.cwd() / "here")
-             for folder in place.parents for program in folder.glob("build/*/bin/polyestd")
+             for folder in place.parents if _is_own_checkout(folder)
+             for program in folder.glob("build/*/bin/polyestd")
              if os.access(program, os.X_OK)]
     if not built:
         raise Unavailable("polyestd is not installed: it is in the package polyest; or give its "
                           "path with daemon=… or in the environment variable POLYEST_DAEMON")
     return str(max(built, key=lambda program: program.stat().st_mtime))
+
+
+def _is_own_checkout(folder: Path) -> bool:
+    """Whether it is a checkout of polyest in which nobody else may have put a program."""
+    if not (folder / "proto" / "polyest").is_dir():
+        return False
+    status = folder.stat()
+    return status.st_uid in (0, os.getuid()) and not status.st_mode & stat.S_IWOTH
 
 
 class Daemon:
