@@ -5,7 +5,8 @@
 #include <absl/strings/str_join.h>
 #include <absl/strings/str_split.h>
 
-#include <set>
+#include <utility>
+#include <vector>
 
 #include "core/common/status.h"
 #include "proto/wire/transport/file_text.h"
@@ -50,7 +51,6 @@ absl::StatusOr<TokenTable::Token> TokenTable::ParseLine(absl::string_view line) 
 
 absl::StatusOr<TokenTable> TokenTable::Parse(absl::string_view text, const std::string& file) {
   TokenTable table;
-  std::set<TokenDigest> digests;
   int line_number = 0;
   for (absl::string_view line : absl::StrSplit(text, '\n')) {
     ++line_number;
@@ -62,15 +62,14 @@ absl::StatusOr<TokenTable> TokenTable::Parse(absl::string_view text, const std::
     if (line.find_first_not_of(" \t\r") == absl::string_view::npos) continue;
     absl::StatusOr<Token> token = ParseLine(line);
     if (!token.ok()) return refuse(token.status().message());
-    if (!digests.insert(token->digest).second) {
+    if (!table.callers_.emplace(token->digest, std::move(token->caller)).second) {
       return refuse("the same token stands on a line before");
     }
-    if (table.tokens_.size() == kMaxTokens) {
+    if (table.callers_.size() > kMaxTokens) {
       return refuse(absl::StrCat("there may be ", kMaxTokens, " tokens"));
     }
-    table.tokens_.push_back(*std::move(token));
   }
-  if (table.tokens_.empty()) {
+  if (table.callers_.empty()) {
     return absl::InvalidArgumentError(absl::StrCat(
         file, ": there is no token in it, so that nobody could get in; polyestd --new-token makes ",
         "one"));
@@ -84,13 +83,9 @@ absl::StatusOr<TokenTable> TokenTable::Read(const std::string& file) {
 }
 
 std::optional<Caller> TokenTable::Find(absl::string_view token) const {
-  const TokenDigest digest = DigestOf(token);
-  const Token* found = nullptr;
-  for (const Token& known : tokens_) {
-    if (SameDigest(known.digest, digest)) found = &known;
-  }
-  if (found == nullptr) return std::nullopt;
-  return found->caller;
+  const auto found = callers_.find(DigestOf(token));
+  if (found == callers_.end()) return std::nullopt;
+  return found->second;
 }
 
 absl::StatusOr<NewToken> MakeTokenFor(absl::string_view words) {

@@ -1,5 +1,6 @@
 #include "server/security/token_table.h"
 
+#include <absl/strings/str_cat.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -44,6 +45,24 @@ TEST(TokenTable, FindsNobodyForOtherTokens) {
   EXPECT_FALSE(table->Find(MakeToken()));
   // The digest, which the file shows, is not a token.
   EXPECT_FALSE(table->Find(ToHex(DigestOf(rig.secret))));
+}
+
+TEST(TokenTable, FindsEveryTokenOfALargeFileAndTakesNoneMore) {
+  const auto line = [](size_t k) {
+    return absl::StrCat("rig", k, " chassis writer ", ToHex(DigestOf(absl::StrCat(k))), "\n");
+  };
+  std::string text;
+  for (size_t k = 0; k < TokenTable::kMaxTokens; ++k) text += line(k);
+  const auto table = TokenTable::Parse(text, "tokens");
+  ASSERT_TRUE(table.ok()) << table.status();
+  for (size_t k = 0; k < TokenTable::kMaxTokens; ++k) {
+    const auto found = table->Find(absl::StrCat(k));
+    ASSERT_TRUE(found) << k;
+    ASSERT_EQ(found->name, absl::StrCat("rig", k));
+  }
+  EXPECT_FALSE(table->Find(absl::StrCat(TokenTable::kMaxTokens)));
+  EXPECT_EQ(Refusal(text + line(TokenTable::kMaxTokens)),
+            "tokens, line 10001: there may be 10000 tokens");
 }
 
 TEST(TokenTable, RefusesAFileWithoutAToken) {
