@@ -2,16 +2,13 @@
 
 #include <absl/cleanup/cleanup.h>
 #include <absl/strings/str_cat.h>
-#include <absl/strings/str_format.h>
 
 #include <algorithm>
 #include <limits>
 #include <utility>
 
 #include "core/common/status.h"
-#include "proto/wire/refusal/refusal.h"
 #include "server/digest/digest.h"
-#include "server/execution/guarded.h"
 #include "server/sessions/create_time.h"
 #include "server/sessions/row_limits.h"
 #include "server/telemetry/metrics.h"
@@ -46,7 +43,8 @@ Session::Session(const SessionServices& services, SessionHead head,
       strand_(std::make_shared<Strand>(services.executor, head_.tenant + "/sessions")),
       ledger_(head_.place),
       writer_(head_.name),
-      observers_(head_.name) {
+      observers_(std::make_shared<ObserverList>(head_.name, services.executor,
+                                                head_.tenant + "/sessions")) {
   if (loaded == nullptr) return;
   loaded->Attach(services.journal, number(), services.SnapshotRoom(number(), tenant()));
   Replace({std::move(loaded), 0});
@@ -70,7 +68,7 @@ v1::Session Session::Describe() const {
   v1::Session::Activity& activity = *session.mutable_activity();
   activity.set_loaded(summary.loaded);
   activity.set_has_writer(writer_.is_held());
-  activity.set_watcher_count(static_cast<int32_t>(observers_.size()));
+  activity.set_watcher_count(static_cast<int32_t>(observers_->size()));
   activity.set_batch_count(place.sequence - head_.place.sequence);
   activity.set_estimate_count(summary.estimates);
   activity.set_reexpansion_count(summary.reexpansions);
@@ -90,119 +88,18 @@ std::optional<Session::Clock::duration> Session::IdleTime() const {
 
 void Session::Close() {
   closing_.request_stop();
-  for (const auto& observer : observers_.Close()) observer->OnClosed();
+  for (const auto& observer : observers_->Close()) observer->OnClosed();
   if (const auto writer = writer_.Close(); writer != nullptr) writer->OnClosed();
 }
 
 void Session::SendAway() {
-  for (const auto& observer : observers_.All()) observer->OnMoved();
+  for (const auto& observer : observers_->All()) observer->OnMoved();
   if (const auto writer = writer_.writer(); writer != nullptr) writer->OnMoved();
 }
 
 absl::Status Session::CheckOpen() const {
   if (!closing_.stop_requested()) return absl::OkStatus();
   return absl::NotFoundError(absl::StrCat(name(), " has been deleted"));
-}
-
-Session::InMemory Session::Present() const {
-  const std::lock_guard lock(mutex_);
-  return in_memory_;
-}
-
-bool Session::ReadyToTake() const {
-  const SharedJournal* const shared = services_.journal.shared();
-  const InMemory present = Present();
-  return CheckOpen().ok() && present.loaded != nullptr && present.losses == ledger_.losses() &&
-         (shared == nullptr || shared->Owns(number()));
-}
-
-void Session::Weigh() {
-  if (services_.tenant_memory == nullptr) return;
-  const std::shared_ptr<LoadedSession> loaded = Present().loaded;
-  if (loaded == nullptr) return services_.tenant_memory->Forget(number());
-  services_.tenant_memory->Set(number(), tenant(), loaded->memory_bytes(), weak_from_this());
-}
-
-absl::Status Session::CheckMemory(int64_t bytes) const {
-  if (services_.tenant_memory == nullptr) return absl::OkStatus();
-  return services_.tenant_memory->MakeRoom(tenant(), bytes);
-}
-
-// Exchanges what is in memory. The parameter then holds what was there before, and destroys it
-// after the lock is released.
-void Session::Replace(InMemory in_memory) {
-  if (in_memory.loaded != nullptr) {
-    activity_.OnLoaded(in_memory.loaded->sequence(), in_memory.loaded->measured_s());
-  } else {
-    activity_.OnUnloaded();
-  }
-  const std::lock_guard lock(mutex_);
-  std::swap(in_memory_, in_memory);
-}
-
-absl::StatusOr<std::shared_ptr<LoadedSession>> Session::Loaded(const Stop& stop) {
-  POLYEST_RETURN_IF_ERROR(CheckOpen());
-  POLYEST_RETURN_IF_ERROR(Own());
-  const uint64_t losses = ledger_.losses();
-  const InMemory present = Present();
-  if (present.loaded != nullptr && present.losses == losses) {
-    if (present.loaded->in_doubt()) {
-      POLYEST_RETURN_IF_ERROR(AwaitKept(*present.loaded, stop));
-      POLYEST_RETURN_IF_ERROR(present.loaded->Renew(stop));
-    }
-    present.loaded->Release(ledger_.kept().sequence);
-    return present.loaded;
-  }
-  POLYEST_RETURN_IF_ERROR(services_.memory.Check());
-  Replace({nullptr, present.losses});
-  Weigh();
-  // No batch is taken until the session is loaded again below.
-  const auto check_memory = [this](int64_t bytes) { return CheckMemory(bytes); };
-  POLYEST_ASSIGN_OR_RETURN(std::shared_ptr<LoadedSession> loaded,
-                           LoadedSession::Load(services_.journal, head_, ledger_.kept(),
-                                               services_.Loading(check_memory), stop));
-  loaded->Attach(services_.journal, number(), services_.SnapshotRoom(number(), tenant()));
-  Log(spdlog::level::info, "session loaded", {{"session", name()}, {"tenant", tenant()}});
-  passed_on_ = nullptr;
-  history_.reset();
-  Replace({loaded, losses});
-  Weigh();
-  return loaded;
-}
-
-absl::Status Session::Own() {
-  SharedJournal* const shared = services_.journal.shared();
-  if (shared == nullptr) return absl::OkStatus();
-  if (ReadyToTake()) return absl::OkStatus();
-  // The claim settles a batch that is just being taken. The next waits for what the claim changes.
-  const std::lock_guard taking(taking_);
-  const absl::StatusOr<SessionPlace> place = shared->Claim(number());
-  if (!place.ok()) {
-    const std::optional<Refusal> refusal = RefusalOf(place.status());
-    if (refusal && refusal->reason == kOwnedElsewhere) Drop();
-    return place.status();
-  }
-  const SessionPlace kept = ledger_.kept();
-  if (place->sequence < kept.sequence) {
-    return absl::DataLossError(
-        absl::StrFormat("batches %d to %d of the session were acknowledged and are missing in the "
-                        "journal",
-                        place->sequence + 1, kept.sequence));
-  }
-  if (place->sequence == kept.sequence && ledger_.all_kept()) return absl::OkStatus();
-  Drop();
-  if (services_.stored != nullptr) {
-    services_.stored->RecountRows(number(), tenant(), place->rows);
-  }
-  ledger_.Restart(*place);
-  return absl::OkStatus();
-}
-
-void Session::Follow(const SessionPlace& place) {
-  SharedJournal* const shared = services_.journal.shared();
-  if (shared == nullptr || shared->Owns(number())) return;
-  // An estimator that is still in memory, because this daemon was the owner once, lacks batches.
-  ledger_.Follow(place, loaded());
 }
 
 absl::Status Session::TakeRoom(const SessionPlace& place, const v1::Measurements& batch,
@@ -318,11 +215,15 @@ absl::StatusOr<SharedEstimate> Session::LatestEstimate(const Stop& stop) {
     }
   }
   CountEstimate(*latest, Clock::now() - begin);
-  WhenKept(latest->sequence(), Present().losses,
-           [self = shared_from_this(), latest](const absl::Status& kept) {
-             if (kept.ok()) self->observers_.OnEstimate(latest);
-           });
+  AnnounceWhenKept(latest);
   return latest;
+}
+
+void Session::AnnounceWhenKept(const SharedEstimate& estimate) {
+  WhenKept(estimate->sequence(), Present().losses,
+           [observers = observers_, estimate](const absl::Status& kept) {
+             if (kept.ok()) observers->Announce(estimate);
+           });
 }
 
 absl::Status Session::LoadHistory() {
@@ -355,42 +256,13 @@ absl::Status Session::WithEstimator(const LoadedSession::Work& work, const Stop&
 
 absl::Status Session::Observe(std::shared_ptr<SessionObserver> observer, const Stop& stop) {
   POLYEST_RETURN_IF_ERROR(CheckOpen());
+  SharedEstimate present;
   if (ledger_.taken().samples > 0) {
-    POLYEST_ASSIGN_OR_RETURN(const SharedEstimate present, CurrentEstimate(stop));
-    WhenKept(present->sequence(), Present().losses, [observer, present](const absl::Status& kept) {
-      if (kept.ok()) observer->OnEstimate(present);
-    });
+    POLYEST_ASSIGN_OR_RETURN(present, CurrentEstimate(stop));
   }
-  return observers_.Add(std::move(observer));
-}
-
-// Takes what is computed out of memory.
-void Session::Drop() {
-  Replace({nullptr, Present().losses});
-  Weigh();
-  passed_on_ = nullptr;
-  history_.reset();
-}
-
-void Session::Unload() {
-  // What it still holds after a lack of memory leaves the next time.
-  Guarded([this] {
-    UnloadIfIdle();
-    return absl::OkStatus();
-  }).IgnoreError();
-}
-
-void Session::UnloadIfIdle() {
-  // A writer that claims the session does so before this lock, and it stays in memory, or sees that
-  // it is gone.
-  std::unique_lock lock(mutex_);
-  const bool idle = IdleTime().has_value();
-  const auto dropped = idle ? std::move(in_memory_.loaded) : nullptr;
-  lock.unlock();
-  if (!idle) return Weigh();
-  Drop();
-  if (SharedJournal* const shared = services_.journal.shared()) shared->Release(number());
-  Log(spdlog::level::info, "session unloaded", {{"session", name()}, {"tenant", tenant()}});
+  POLYEST_RETURN_IF_ERROR(observers_->Add(std::move(observer)));
+  if (present != nullptr) AnnounceWhenKept(present);
+  return absl::OkStatus();
 }
 
 }  // namespace polyest::internal

@@ -181,10 +181,10 @@ class Session : public std::enable_shared_from_this<Session> {
   absl::Status Observe(std::shared_ptr<SessionObserver> observer, const Stop& stop);
   // Removes an observer. May be called from any thread, as may the next.
   void Unobserve(const SessionObserver* observer) {
-    observers_.Remove(observer);
+    observers_->Remove(observer);
     activity_.OnUsed();
   }
-  bool observed() const { return observers_.size() > 0; }
+  bool observed() const { return observers_->size() > 0; }
   // Weighs what is in memory of the session. May be called on the strand, or before others know
   // the session.
   void Weigh();
@@ -221,6 +221,7 @@ class Session : public std::enable_shared_from_this<Session> {
   void Drop();
   void UnloadIfIdle();
   absl::Status LoadHistory();
+  void AnnounceWhenKept(const SharedEstimate& estimate);
   void CountEstimate(const v1::Estimate& estimate, Clock::duration duration);
 
   const SessionServices services_;
@@ -234,7 +235,7 @@ class Session : public std::enable_shared_from_this<Session> {
 
   std::stop_source closing_;
   WriterLease writer_;
-  ObserverList observers_;
+  const std::shared_ptr<ObserverList> observers_;
   SessionActivity activity_;
 
   std::mutex taking_;  // held while a batch is taken

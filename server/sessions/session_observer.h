@@ -10,8 +10,8 @@ namespace polyest::internal {
 
 using SharedEstimate = std::shared_ptr<const v1::Estimate>;
 
-// The methods are called from the session's strand, from the journal, or by the thread that closes
-// the session; they must not wait.
+// The methods are called from a strand of the executor, or by the thread that closes the session;
+// they must not wait.
 class SessionObserver {
  public:
   virtual ~SessionObserver() = default;

@@ -1,67 +1,14 @@
-#include "server/sessions/session.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <atomic>
-#include <cmath>
 #include <thread>
 
 #include "proto/wire/refusal/refusal.h"
-#include "tests/testing/faulty_journal.h"
-#include "tests/testing/problem_json.h"
-#include "tests/unit/server/sessions/counting_observer.h"
+#include "tests/unit/server/sessions/session_fixture.h"
 
 namespace polyest::internal {
 namespace {
-
-// Returns samples of a nearly undamped motion: x = v0/ω sin ωt at ω = 2π, near v0 = 1.
-v1::Measurements Batch(std::initializer_list<double> times) {
-  v1::Measurements batch;
-  auto& x = *batch.add_channels();
-  x.set_name("x");
-  for (const double t : times) {
-    batch.add_time_s(t);
-    x.add_values(std::sin(2 * M_PI * t) * std::exp(-0.1 * t) / (2 * M_PI));
-  }
-  return batch;
-}
-
-class SessionTest : public testing::Test {
- protected:
-  void SetUp() override {
-    SessionHead head;
-    head.name = "sessions/a";
-    const auto number = journal_.Create(head, SmallProblem(), /*hidden=*/false);
-    ASSERT_TRUE(number.ok()) << number.status();
-    Restart();
-  }
-  // Acts as if the daemon had ended: only the journal remains.
-  void Restart() {
-    session_ = std::make_shared<Session>(SessionServices{executor_, journal_, models_, limits_},
-                                         journal_.Heads()->front());
-  }
-  absl::StatusOr<v1::Acknowledgement> Add(int64_t sequence, const v1::Measurements& batch) {
-    const absl::Status loaded = session_->Load({});
-    if (!loaded.ok()) return loaded;
-    return session_->Add(sequence, batch);
-  }
-  // Returns what is known so far of whether the batch is kept.
-  std::shared_ptr<std::optional<absl::Status>> Kept(int64_t sequence) {
-    auto kept = std::make_shared<std::optional<absl::Status>>();
-    session_->WhenKept(sequence, losses_, [kept](const absl::Status& status) { *kept = status; });
-    return kept;
-  }
-
-  // The test's own thread acts as the strand: nothing else touches the session.
-  FaultyJournal journal_;
-  Executor executor_{
-      {.threads_per_lane = 1, .threads = 1, .capacity = 10, .capacity_per_lane = 10}};
-  ModelLibrary models_;
-  SessionLimits limits_{.batch_rows = 4, .rows = 6};
-  std::shared_ptr<Session> session_;
-  uint64_t losses_ = 0;  // The number of losses that the caller of Kept has seen.
-};
 
 TEST_F(SessionTest, AcknowledgesBatchesAndCountsTheirValues) {
   v1::Measurements batch = Batch({0.1, 0.2, 0.3});
@@ -188,23 +135,6 @@ TEST_F(SessionTest, TakesNothingWhileItIsNotInMemory) {
   EXPECT_TRUE(session_->Add(1, Batch({0.1})).ok());
 }
 
-TEST_F(SessionTest, PassesThePresentEstimateAndEveryNewOneToObservers) {
-  auto early = std::make_shared<CountingObserver>();
-  auto late = std::make_shared<CountingObserver>();
-  ASSERT_TRUE(session_->Observe(early, {}).ok());
-  EXPECT_TRUE(early->estimates.empty());
-  ASSERT_TRUE(Add(1, Batch({0.1})).ok());
-  ASSERT_TRUE(session_->Observe(late, {}).ok());
-  ASSERT_EQ(early->estimates.size(), 1u);
-  EXPECT_EQ(late->estimates, early->estimates);
-  session_->Unobserve(early.get());
-  ASSERT_TRUE(Add(2, Batch({0.2})).ok());
-  ASSERT_TRUE(session_->CurrentEstimate({}).ok());
-  EXPECT_EQ(early->estimates.size(), 1u);
-  ASSERT_EQ(late->estimates.size(), 2u);
-  EXPECT_EQ(late->estimates[1]->sequence(), 2);
-}
-
 TEST_F(SessionTest, HasOneWriterAtATime) {
   auto first = std::make_shared<CountingObserver>();
   auto second = std::make_shared<CountingObserver>();
@@ -292,6 +222,7 @@ TEST_F(SessionTest, AcknowledgesABatchOnlyWhenItIsKept) {
   const auto second = Kept(2), first = Kept(1);
   EXPECT_FALSE(first->has_value() || second->has_value());
   EXPECT_EQ(session_->Describe().last_sequence(), 0);
+  AwaitNews();
   EXPECT_TRUE(watcher->estimates.empty());
   // The session is still in use, and a repeat is not answered early.
   session_->Unload();
@@ -301,6 +232,7 @@ TEST_F(SessionTest, AcknowledgesABatchOnlyWhenItIsKept) {
   journal_.Release();
   EXPECT_TRUE((*first)->ok() && (*second)->ok());
   EXPECT_EQ(session_->Describe().last_sequence(), 2);
+  AwaitNews();
   EXPECT_EQ(watcher->estimates.size(), 1u);
 }
 
