@@ -17,9 +17,10 @@ constexpr std::chrono::milliseconds kShortestPause{10};
 // A look that finds the memory full unloads one in this many of the idle sessions in memory.
 constexpr size_t kLeaving = 4;
 
-// Unloads a session on its strand. A busy daemon refuses the task; the next look then tries again.
-void Unload(const std::shared_ptr<Session>& session) {
-  session->strand().Submit([session] { session->Unload(); }).IgnoreError();
+// Unloads a session on its strand, unless it has been used since it was found idle for that time. A
+// busy daemon refuses the task; the next look then tries again.
+void Unload(const std::shared_ptr<Session>& session, Session::Clock::duration idle) {
+  session->strand().Submit([session, idle] { session->Unload(idle); }).IgnoreError();
 }
 
 }  // namespace
@@ -47,7 +48,7 @@ void Housekeeper::UnloadIdle() {
   for (const auto& session : registry_.All()) {
     const auto idle = session->IdleTime();
     if (!session->loaded() || !idle || *idle < options_.idle) continue;
-    Unload(session);
+    Unload(session, *idle);
   }
 }
 
@@ -59,7 +60,7 @@ void Housekeeper::MakeRoom() {
   }
   std::sort(idle.begin(), idle.end(), std::greater<>());
   idle.resize((idle.size() + kLeaving - 1) / kLeaving);
-  for (const auto& [time, session] : idle) Unload(session);
+  for (const auto& [time, session] : idle) Unload(session, time);
   // The sessions that were unloaded since the last look have freed theirs.
   Trim();
 }

@@ -18,7 +18,9 @@ namespace polyest::internal {
 
 class Session::Computing {
  public:
-  Computing(Session& session, const LoadedSession& loaded) : session_(session), loaded_(loaded) {}
+  Computing(Session& session, const LoadedSession& loaded) : session_(session), loaded_(loaded) {
+    session_.activity_.OnComputing();
+  }
   ~Computing() {
     const Clock::duration spent = Clock::now() - begin_;
     if (session_.services_.metrics != nullptr) {
@@ -82,7 +84,8 @@ v1::Session Session::Describe() const {
 }
 
 std::optional<Session::Clock::duration> Session::IdleTime() const {
-  if (!ledger_.all_kept() || writer_.is_held() || observed()) return std::nullopt;
+  const bool used = !ledger_.all_kept() || writer_.is_held() || observed() || activity_.computing();
+  if (used) return std::nullopt;
   return activity_.idle();
 }
 

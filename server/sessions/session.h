@@ -188,9 +188,9 @@ class Session : public std::enable_shared_from_this<Session> {
   // Weighs what is in memory of the session. May be called on the strand, or before others know
   // the session.
   void Weigh();
-  // Takes the estimator out of memory if the session is not in use. May be called on the strand
-  // only.
-  void Unload();
+  // Takes the estimator out of memory if the session is not in use and has not been for the time
+  // given: it may have been used since somebody found it idle. May be called on the strand only.
+  void Unload(Clock::duration idle = Clock::duration::zero());
 
  private:
   // Measures the time of a computation.
@@ -219,7 +219,7 @@ class Session : public std::enable_shared_from_this<Session> {
   InMemory Present() const;
   void Replace(InMemory in_memory);
   void Drop();
-  void UnloadIfIdle();
+  void UnloadIfIdle(Clock::duration at_least);
   absl::Status LoadHistory();
   void AnnounceWhenKept(const SharedEstimate& estimate);
   void CountEstimate(const v1::Estimate& estimate, Clock::duration duration);

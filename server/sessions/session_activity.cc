@@ -18,9 +18,15 @@ void SessionActivity::OnUnloaded() {
   measured_s_ = computed_s_ = 0;
 }
 
+void SessionActivity::OnComputing() {
+  const std::lock_guard lock(mutex_);
+  computing_ = true;
+}
+
 void SessionActivity::OnComputed(Clock::duration spent, int64_t sequence, double measured_s) {
   const double spent_s = std::chrono::duration<double>(spent).count();
   const std::lock_guard lock(mutex_);
+  computing_ = false;
   compute_s_ += spent_s;
   computed_s_ += spent_s;
   measured_s_ = measured_s - measured_before_s_;
@@ -44,6 +50,11 @@ void SessionActivity::OnUsed() {
 bool SessionActivity::loaded() const {
   const std::lock_guard lock(mutex_);
   return loaded_;
+}
+
+bool SessionActivity::computing() const {
+  const std::lock_guard lock(mutex_);
+  return computing_;
 }
 
 SessionActivity::Clock::duration SessionActivity::idle() const {

@@ -18,7 +18,9 @@ class SessionActivity {
   // `measured_s` seconds of measurements, or that it left memory.
   void OnLoaded(int64_t sequence, double measured_s);
   void OnUnloaded();
-  // Notes a computation of this duration, after which the estimator has processed the batches and
+  // Notes that a computation begins, during which the session is in use.
+  void OnComputing();
+  // Notes its end, and its duration, after which the estimator has processed the batches and
   // the seconds of measurements given.
   void OnComputed(Clock::duration spent, int64_t sequence, double measured_s);
   // Notes an estimate after `reexpansions` re-expansions of the session in all. Returns how many of
@@ -28,6 +30,7 @@ class SessionActivity {
   void OnUsed();
 
   bool loaded() const;
+  bool computing() const;
   // Returns the time since the session was last used or computed.
   Clock::duration idle() const;
 
@@ -46,6 +49,7 @@ class SessionActivity {
  private:
   mutable std::mutex mutex_;
   bool loaded_ = false;
+  bool computing_ = false;
   int64_t estimates_ = 0;
   int64_t reexpansions_ = 0;
   double compute_s_ = 0;

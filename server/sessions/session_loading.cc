@@ -122,19 +122,19 @@ void Session::Drop() {
   history_.reset();
 }
 
-void Session::Unload() {
+void Session::Unload(Clock::duration idle) {
   // What it still holds after a lack of memory leaves the next time.
-  Guarded([this] {
-    UnloadIfIdle();
+  Guarded([&] {
+    UnloadIfIdle(idle);
     return absl::OkStatus();
   }).IgnoreError();
 }
 
-void Session::UnloadIfIdle() {
+void Session::UnloadIfIdle(Clock::duration at_least) {
   // A writer that claims the session does so before this lock, and it stays in memory, or sees that
   // it is gone.
   std::unique_lock lock(mutex_);
-  const bool idle = IdleTime().has_value();
+  const bool idle = IdleTime() >= at_least;  // nothing is less than any time
   const auto dropped = idle ? std::move(in_memory_.loaded) : nullptr;
   lock.unlock();
   if (!idle) return Weigh();

@@ -99,8 +99,8 @@ absl::Status TenantMemory::MakeRoom(const std::string& tenant, int64_t more) {
     if (excess <= 0) break;
     // Noted first, because the session may have left, and come back, before Submit returns.
     NoteLeaving(session->number(), true);
-    const auto unload = [this, session = session] {  // the session keeps this object alive
-      session->Unload();
+    const auto unload = [this, session = session, time = time] {  // the session keeps this alive
+      session->Unload(time);
       Trim();
     };
     if (session->strand().Submit(unload).ok()) {

@@ -212,6 +212,29 @@ TEST_F(SessionTest, IsUnloadedWhenIdleAndComesBackOnUse) {
   EXPECT_EQ((*session_->CurrentEstimate({}))->SerializeAsString(), before);
 }
 
+TEST_F(SessionTest, IsInUseWhileItIsComputed) {
+  ASSERT_TRUE(Add(1, Batch({0.1})).ok());
+  std::optional<Session::Clock::duration> idle;
+  const auto look = [&](Estimator&, int64_t) {
+    idle = session_->IdleTime();
+    return absl::OkStatus();
+  };
+  ASSERT_TRUE(session_->WithEstimator(look, {}).ok());
+  EXPECT_EQ(idle, std::nullopt);
+  EXPECT_NE(session_->IdleTime(), std::nullopt);
+}
+
+TEST_F(SessionTest, StaysInMemoryIfItHasBeenUsedSinceItWasFoundIdle) {
+  ASSERT_TRUE(session_->Load({}).ok());
+  const auto found = session_->IdleTime();
+  ASSERT_TRUE(found);
+  ASSERT_TRUE(session_->Process({}).ok());
+  session_->Unload(*found + std::chrono::hours(1));
+  EXPECT_TRUE(session_->loaded());
+  session_->Unload(*session_->IdleTime());
+  EXPECT_FALSE(session_->loaded());
+}
+
 TEST_F(SessionTest, AcknowledgesABatchOnlyWhenItIsKept) {
   journal_.Hold();
   auto watcher = std::make_shared<CountingObserver>();
