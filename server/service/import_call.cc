@@ -31,11 +31,14 @@ void ImportFlow::OnRead(bool ok) {
   const std::lock_guard lock(mutex_);
   reading_ = false;
   half_closed_ = !ok;
-  if (!std::exchange(any_, true)) timer_.Stop();
+  const bool first = !std::exchange(any_, true);
+  if (first) timer_.Stop();
   if (!end_ && !finished_) {
     working_ = true;
-    const absl::Status accepted =
-        context_.executor.Submit(lane_, [flow = shared_from_this()] { flow->Take(); });
+    // A full queue refuses new imports, not those that have begun: each has one task at a time.
+    const absl::Status accepted = context_.executor.Submit(
+        lane_, [flow = shared_from_this()] { flow->Take(); },
+        first ? Admission::kIfRoom : Admission::kAlways);
     if (!accepted.ok()) {
       working_ = false;
       End(accepted);

@@ -50,7 +50,7 @@ class RecordFlow final : public Drainable, public std::enable_shared_from_this<R
     absl::Status begun = next.status();
     if (begun.ok()) {
       next_ = *std::move(next);
-      begun = StartReading();
+      begun = StartReading(Admission::kIfRoom);
     }
     if (!begun.ok()) End(begun);
     Advance();
@@ -90,10 +90,10 @@ class RecordFlow final : public Drainable, public std::enable_shared_from_this<R
  private:
   // The following are called with the mutex held.
 
-  absl::Status StartReading() {
+  absl::Status StartReading(Admission admission) {
     reading_ = true;
-    const absl::Status accepted =
-        executor_.Submit(lane_, [flow = this->shared_from_this()] { flow->Read(); });
+    const absl::Status accepted = executor_.Submit(
+        lane_, [flow = this->shared_from_this()] { flow->Read(); }, admission);
     if (!accepted.ok()) reading_ = false;
     return accepted;
   }
@@ -115,7 +115,8 @@ class RecordFlow final : public Drainable, public std::enable_shared_from_this<R
       return;
     }
     if (!end_) {
-      const absl::Status accepted = StartReading();
+      // A full queue refuses new calls, not those that have begun: each has one task at a time.
+      const absl::Status accepted = StartReading(Admission::kAlways);
       if (accepted.ok()) return;
       End(accepted);
     }

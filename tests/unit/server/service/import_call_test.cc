@@ -27,11 +27,15 @@ class Reader final : public grpc::ServerCallbackReader<v1::ImportSessionRequest>
     BindReactor(&call);
   }
 
+  // Gives the import a record that it has asked for.
+  void GiveNow(const v1::SessionRecord& record) {
+    *request_->mutable_record() = record;
+    call_.OnReadDone(true);
+  }
   // Waits until the import asks for a record, and gives it this one.
   void Give(const v1::SessionRecord& record) {
     asked_.acquire();
-    *request_->mutable_record() = record;
-    call_.OnReadDone(true);
+    GiveNow(record);
   }
   // Waits until the import asks for a record, which it is not given.
   void Await() { asked_.acquire(); }
@@ -142,6 +146,30 @@ TEST_F(ImportCallTest, KeepsNothingWhenItIsCancelledBetweenTwoRecords) {
   EXPECT_TRUE(journal_.ReadProblem(1).ok());
   free.set_value();
   EXPECT_EQ(finished.get_future().get(), grpc::StatusCode::CANCELLED);
+  import->OnDone();
+}
+
+TEST_F(ImportCallTest, GoesOnWhileTheQueueRefusesNewCalls) {
+  ServiceContext context = Context();
+  auto* const import = new ImportCall(context, call_, &imported_);
+  std::promise<grpc::Status> finished;
+  Reader reader(*import, [&](const grpc::Status& status) { finished.set_value(status); });
+  v1::SessionRecord head = Head();
+  head.mutable_head()->set_batch_count(1);
+  reader.Give(head);
+  reader.Await();
+  std::promise<void> free;
+  auto wait = [freed = free.get_future().share()] { freed.wait(); };
+  while (executor_.Submit("busy", wait).ok()) {
+  }
+  v1::SessionRecord end;
+  end.mutable_end();
+  reader.GiveNow(Batch());
+  free.set_value();
+  reader.Give(end);
+  reader.End();
+  const grpc::Status status = finished.get_future().get();
+  EXPECT_TRUE(status.ok()) << status.error_message();
   import->OnDone();
 }
 

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <future>
 #include <new>
 
@@ -15,33 +16,63 @@ struct Record {
   Record& operator=(const Record&) { throw std::bad_alloc(); }
 };
 
+template <typename Record>
 class Reactor final : public grpc::ServerWriteReactor<Record> {
  public:
   void OnDone() override {}
 };
 
 // Plays gRPC's side of the call.
+template <typename Record>
 class Writer final : public grpc::ServerCallbackWriter<Record> {
  public:
-  explicit Writer(Reactor& reactor) : reactor_(reactor) { BindReactor(&reactor); }
+  explicit Writer(Reactor<Record>& reactor) : reactor_(reactor) { this->BindReactor(&reactor); }
 
   void Finish(grpc::Status status) override { finished.set_value(status); }
   void SendInitialMetadata() override {}
-  void Write(const Record*, grpc::WriteOptions) override {}
+  void Write(const Record*, grpc::WriteOptions) override { written.set_value(); }
   void WriteAndFinish(const Record*, grpc::WriteOptions, grpc::Status) override {}
 
+  std::promise<void> written;  // set once
   std::promise<grpc::Status> finished;
 
  private:
   grpc::internal::ServerReactor* reactor() override { return &reactor_; }
   void CallOnDone() override {}
 
-  Reactor& reactor_;
+  Reactor<Record>& reactor_;
 };
 
+TEST(RecordFlow, GoesOnWhileTheQueueRefusesNewCalls) {
+  Reactor<int> reactor;
+  Writer<int> writer(reactor);
+  Executor executor({.threads_per_lane = 1, .threads = 1, .capacity = 1, .capacity_per_lane = 1});
+  const auto flow = std::make_shared<RecordFlow<int>>(executor);
+  flow->OnStart(&reactor, "t", [left = 1](const Stop&) mutable -> absl::StatusOr<std::vector<int>> {
+    return std::vector<int>(static_cast<size_t>(left-- > 0 ? 1 : 0));
+  });
+  writer.written.get_future().get();
+  ASSERT_TRUE(executor.AwaitIdle(std::chrono::steady_clock::time_point::max()));
+  std::promise<void> free;
+  ASSERT_TRUE(executor.Submit("t", [&] { free.get_future().wait(); }).ok());
+  const auto late = std::make_shared<RecordFlow<int>>(executor);
+  Reactor<int> late_reactor;
+  Writer<int> late_writer(late_reactor);
+  late->OnStart(&late_reactor, "t",
+                [](const Stop&) -> absl::StatusOr<std::vector<int>> { return std::vector<int>(); });
+  EXPECT_EQ(late_writer.finished.get_future().get().error_code(),
+            grpc::StatusCode::RESOURCE_EXHAUSTED);
+  flow->OnWritten(true);
+  free.set_value();
+  const grpc::Status finished = writer.finished.get_future().get();
+  EXPECT_TRUE(finished.ok()) << finished.error_message();
+  flow->OnDone();
+  late->OnDone();
+}
+
 TEST(RecordFlow, EndsTheCallThatLacksMemoryForItsRecords) {
-  Reactor reactor;
-  Writer writer(reactor);
+  Reactor<Record> reactor;
+  Writer<Record> writer(reactor);
   Executor executor({.threads_per_lane = 1, .threads = 1, .capacity = 1, .capacity_per_lane = 1});
   const auto flow = std::make_shared<RecordFlow<Record>>(executor);
   flow->OnStart(&reactor, "t", [](const Stop&) -> absl::StatusOr<std::vector<Record>> {
