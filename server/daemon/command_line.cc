@@ -356,7 +356,8 @@ CommandLine ParseCommandLine(int argc, char** argv) {
   AddService(app, daemon, texts);
   AddLimits(app, daemon);
   app.add_option("--max-message-mb", daemon.max_message_mb, "Largest message taken, MiB")
-      ->check(CLI::Range(1, 2047))
+      // SQLite and PostgreSQL take a problem of up to 1 GB.
+      ->check(CLI::Range(1, 900))
       ->capture_default_str();
   AddSecurity(app, daemon, texts.insecure, texts.new_token);
   AddWebOptions(app, texts.web);

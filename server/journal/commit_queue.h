@@ -42,7 +42,8 @@ template <typename Database>
 class CommitQueue {
  public:
   // Changes the database. NOT_FOUND, ALREADY_EXISTS and FAILED_PRECONDITION mean that the write has
-  // changed nothing and that others may be committed; any other error undoes the whole commit.
+  // changed nothing and that others may be committed; so does, in SQLite, the refusal of a value
+  // that is too large. Any other error undoes the whole commit.
   using Write = std::function<absl::Status(Database&)>;
   // Called once, from the writing thread, with OK when the write is on disk.
   using Done = std::function<void(const absl::Status&)>;

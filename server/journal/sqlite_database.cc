@@ -20,7 +20,6 @@ absl::StatusCode CodeOf(int code) {
   switch (code & 0xff) {
     case SQLITE_FULL:
     case SQLITE_NOMEM:
-    case SQLITE_TOOBIG:
       return absl::StatusCode::kResourceExhausted;
     case SQLITE_CORRUPT:
     case SQLITE_NOTADB:
@@ -42,15 +41,23 @@ absl::StatusCode CodeOf(int code) {
   }
 }
 
+// A value that is too large for SQLite. The statement that has it changes nothing, and the
+// transaction goes on.
+absl::Status TooLarge() {
+  return Refuse(absl::StatusCode::kResourceExhausted,
+                "the journal takes no more than 1 GB in one piece", {.reason = kLimitExceeded});
+}
+
 bool ConcernsOnlyItself(const absl::Status& status) {
   return absl::IsNotFound(status) || absl::IsAlreadyExists(status) ||
-         absl::IsFailedPrecondition(status);
+         absl::IsFailedPrecondition(status) || status == TooLarge();
 }
 
 }  // namespace
 
 absl::Status FromSqlite(int code, std::string_view doing) {
   if (code == SQLITE_OK || code == SQLITE_ROW || code == SQLITE_DONE) return absl::OkStatus();
+  if ((code & 0xff) == SQLITE_TOOBIG) return TooLarge();
   // The index of the write-ahead log cannot grow on a full disk either.
   if ((code & 0xff) == SQLITE_FULL || code == SQLITE_IOERR_SHMSIZE) return DiskFull();
   // No file of the process may be as large (ulimit -f). The write that failed has set errno, which

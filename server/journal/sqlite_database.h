@@ -47,8 +47,9 @@ class SqliteDatabase {
   // Runs one or more statements without results.
   absl::Status Execute(const std::string& sql);
   // Makes changes in one transaction, all of them or, if it returns an error, none; sets the
-  // outcome of each. A change that returns NOT_FOUND, ALREADY_EXISTS or FAILED_PRECONDITION has
-  // changed nothing, and the others are committed; any other error undoes them all.
+  // outcome of each. A change that returns NOT_FOUND, ALREADY_EXISTS or FAILED_PRECONDITION, or
+  // that has a value too large for SQLite, has changed nothing, and the others are committed; any
+  // other error undoes them all.
   absl::Status Commit(const std::vector<std::function<absl::Status(SqliteDatabase&)>>& writes,
                       std::vector<absl::Status>& outcomes);
   // Returns the number that a statement such as `PRAGMA user_version` gives.

@@ -109,5 +109,24 @@ TEST_F(CommitQueueTest, FlushesTheLazyOnesOfEveryLane) {
   EXPECT_EQ(written, 3u);
 }
 
+TEST(SqliteDatabase, CommitsTheOthersWhereAValueIsTooLarge) {
+  const TestFolder folder;
+  auto database = SqliteDatabase::Open(folder / "db");
+  ASSERT_TRUE(database.ok()) << database.status();
+  ASSERT_TRUE((*database)->Execute("CREATE TABLE kept (value BLOB)").ok());
+  const auto insert = [](const std::string& value) {
+    return [value](SqliteDatabase& in) {
+      return in.Execute("INSERT INTO kept VALUES (" + value + ")");
+    };
+  };
+  std::vector<absl::Status> outcomes(3);
+  const absl::Status committed =
+      (*database)->Commit({insert("1"), insert("zeroblob(1000000001)"), insert("2")}, outcomes);
+  EXPECT_TRUE(committed.ok()) << committed;
+  EXPECT_TRUE(outcomes[0].ok() && outcomes[2].ok());
+  EXPECT_EQ(outcomes[1].code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_EQ(*(*database)->Number("SELECT sum(value) FROM kept"), 3);
+}
+
 }  // namespace
 }  // namespace polyest::internal
