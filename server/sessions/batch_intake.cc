@@ -27,6 +27,11 @@ double BatchIntake::measured_s() const {
   return measured_s_;
 }
 
+int64_t BatchIntake::held_bytes() const {
+  const std::lock_guard lock(mutex_);
+  return reorder_ ? reorder_->held_bytes() : 0;
+}
+
 int64_t BatchIntake::waiting_rows() const {
   const std::lock_guard lock(mutex_);
   int64_t rows = 0;

@@ -46,6 +46,8 @@ class BatchIntake {
 
   // Returns the number of rows that have not been handed on yet.
   int64_t waiting_rows() const;
+  // Returns about how many bytes the rows take that are held back, to be put in order.
+  int64_t held_bytes() const;
 
   // Records a batch elsewhere, too; gets the place of the session after it.
   using Record = std::function<absl::Status(const SessionPlace&)>;

@@ -160,7 +160,7 @@ int64_t LoadedSession::RowBytes(const ResolvedProblem& problem) {
 
 int64_t LoadedSession::memory_bytes() const {
   return EstimatorAccess::MemoryBytes(*computed_.estimator) +
-         rows_in_memory() * RowBytes(intake_.problem()) +
+         rows_in_memory() * RowBytes(intake_.problem()) + intake_.held_bytes() +
          kCopiesOfProblem * static_cast<int64_t>(problem_.ByteSizeLong());
 }
 

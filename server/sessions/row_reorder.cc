@@ -199,6 +199,13 @@ void RowReorder::Release(Step& step) const {
       step.run_ended || (step.released.rows() > 0 && step.released.run.back() < step.newest.run);
 }
 
+int64_t RowReorder::held_bytes() const {
+  // A row has a node of the tree, with three links and a colour, and an array. The allocator adds
+  // about two words to each.
+  constexpr size_t kRowBytes = sizeof(Rows::value_type) + 8 * sizeof(void*);
+  return held_rows() * static_cast<int64_t>(kRowBytes + columns_.size() * sizeof(double));
+}
+
 void RowReorder::Accept(Step step) {
   held_.erase(held_.begin(), std::next(held_.begin(), step.released_of_held));
   while (!step.added.empty()) {

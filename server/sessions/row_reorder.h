@@ -42,7 +42,7 @@ class RowReorder {
   };
 
  public:
-  // The largest number of rows held back; some 10 MB of memory.
+  // The largest number of rows held back.
   static constexpr int64_t kMaxHeldRows = 100'000;
 
   // Where in a sequence of batches the same rows are to be released once more.
@@ -88,6 +88,8 @@ class RowReorder {
   int64_t held_from() const { return batches_.empty() ? next_ : batches_.front().number; }
   // Returns the number of rows held back.
   int64_t held_rows() const { return static_cast<int64_t>(held_.size()); }
+  // Returns about how many bytes of memory these take: some 100 and 8 for each column, a row.
+  int64_t held_bytes() const;
   // Returns whether these say nothing: neither a row nor the end of a run.
   static bool IsNothing(const Samples& released) {
     return released.rows() == 0 && !released.end_of_run;

@@ -137,8 +137,9 @@ absl::StatusOr<v1::Acknowledgement> Session::Add(int64_t sequence, const v1::Mea
     const SessionPlace before = intake.place();
     const double measured_s = intake.measured_s();
     const auto bytes = static_cast<int64_t>(entry.measurements.size());
-    // A rig whose batches are computed as fast as they come needs no more memory.
-    if (intake.waiting_rows() > 0) POLYEST_RETURN_IF_ERROR(CheckMemory(bytes));
+    // A rig whose batches are computed as fast as they come, and in order, needs no more memory.
+    const bool held = intake.waiting_rows() > 0 || intake.held_bytes() > 0;
+    if (held) POLYEST_RETURN_IF_ERROR(CheckMemory(bytes));
     POLYEST_RETURN_IF_ERROR(TakeRoom(before, batch, bytes));
     absl::Cleanup release_room = [&] { ReleaseRoom({batch.time_s_size(), bytes}); };
     const auto record = [&](const SessionPlace& place) {

@@ -2,11 +2,16 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <malloc.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <random>
+#include <string>
+#include <vector>
+
+#include "core/common/sanitizer.h"
 
 namespace polyest::internal {
 namespace {
@@ -284,6 +289,31 @@ TEST(RowReorder, HasAWindowOfUpToAnHour) {
        {-1.0, 3'601.0, std::nan(""), std::numeric_limits<double>::infinity()}) {
     EXPECT_THAT(CheckReorderWindow("session.reorderWindowS", wrong).message(),
                 HasSubstr("session.reorderWindowS: "));
+  }
+}
+
+TEST(RowReorder, WeighsAboutWhatTheAllocatorGivesForTheRowsHeldBack) {
+  if (POLYEST_ADDRESS_SANITIZER || POLYEST_THREAD_SANITIZER) {
+    GTEST_SKIP() << "a sanitizer has an allocator of its own";
+  }
+  for (const size_t columns : {1u, 10u, 100u}) {
+    std::vector<std::string> names;
+    for (size_t column = 0; column < columns; ++column) names.push_back(std::to_string(column));
+    Samples batch;
+    batch.columns.push_back({names[0], {}, {}});
+    for (int row = 0; row < 2'000; ++row) {
+      batch.time_s.push_back(1e-3 * row);
+      batch.columns[0].value.push_back(row);
+    }
+    RowReorder reorder(names, /*window_s=*/3600);
+    const double before = static_cast<double>(mallinfo2().uordblks);
+    auto step = reorder.Next(batch);
+    ASSERT_TRUE(step.ok()) << step.status();
+    reorder.Accept(*std::move(step));
+    step = absl::CancelledError();  // frees what is left of it
+    const double given = static_cast<double>(mallinfo2().uordblks) - before;
+    ASSERT_EQ(reorder.held_rows(), 2'000);
+    EXPECT_NEAR(static_cast<double>(reorder.held_bytes()), given, 0.2 * given) << columns;
   }
 }
 

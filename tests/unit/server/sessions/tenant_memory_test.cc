@@ -202,6 +202,22 @@ TEST_F(TenantMemoryTest, WeighsBatchesThatAreNotYetComputed) {
   EXPECT_TRUE(session->Add(2, batch).ok());
 }
 
+TEST_F(TenantMemoryTest, WeighsRowsThatAreHeldBackToBePutInOrder) {
+  constexpr double kWindow_s = 3600;
+  const auto created = registry_->Create("t", "a", SmallProblem(), kWindow_s);
+  ASSERT_TRUE(created.ok()) << created.status();
+  Session& session = **created;
+  const auto writer = std::make_shared<Writer>();
+  ASSERT_TRUE(session.ClaimWriter(writer, "rig").ok());
+  const int64_t before = Held("t");
+  v1::Measurements batch = Rows(10'000);  // some 100 bytes each
+  ASSERT_TRUE(session.Add(1, batch).ok());
+  ASSERT_TRUE(session.Process({}).ok());
+  EXPECT_GE(Held("t"), before + 1'000'000);
+  for (double& time : *batch.mutable_time_s()) time += 10;
+  EXPECT_EQ(RefusalOf(session.Add(2, batch).status())->limit, "--max-tenant-memory-mb");
+}
+
 TEST_F(TenantMemoryTest, WeighsWhatTheAllocatorGives) {
   if (POLYEST_ADDRESS_SANITIZER || POLYEST_THREAD_SANITIZER) {
     GTEST_SKIP() << "a sanitizer has an allocator of its own";
