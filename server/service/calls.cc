@@ -11,16 +11,20 @@
 namespace polyest::internal {
 namespace {
 
+UnaryCall::Work WorkOfCaller(const Caller& caller, CallerWork work) {
+  return [caller, work = std::move(work)](const Stop& stop, std::stop_source&,
+                                          const UnaryCall::Finisher& finish) {
+    finish(work(caller, stop));
+    return absl::OkStatus();
+  };
+}
+
 Job JobInLane(const ServiceContext& context, const Caller& caller, const char* lane,
               CallerWork work) {
   return {[&executor = context.executor, lane = absl::StrCat(caller.tenant, lane)](Task task) {
             return executor.Submit(lane, std::move(task));
           },
-          [caller, work = std::move(work)](const Stop& stop, std::stop_source&,
-                                           const UnaryCall::Finisher& finish) {
-            finish(work(caller, stop));
-            return absl::OkStatus();
-          }};
+          WorkOfCaller(caller, std::move(work))};
 }
 
 using FoundSession = absl::StatusOr<std::shared_ptr<Session>>;
@@ -57,6 +61,14 @@ Job JobOfCaller(const ServiceContext& context, const Caller& caller, CallerWork 
 
 Job ShortJobOfCaller(const ServiceContext& context, const Caller& caller, CallerWork work) {
   return JobInLane(context, caller, "/sessions", std::move(work));
+}
+
+Job JobAtOnce(const Caller& caller, CallerWork work) {
+  return {[](const Task& task) {
+            task();
+            return absl::OkStatus();
+          },
+          WorkOfCaller(caller, std::move(work))};
 }
 
 absl::StatusOr<Job> JobOfSession(const ServiceContext& context, const Caller& caller,

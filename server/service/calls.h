@@ -35,6 +35,8 @@ Job JobOfCaller(const ServiceContext& context, const Caller& caller, CallerWork 
 // Returns a job for work that is soon done, in the lane of the caller's sessions, where it does not
 // wait for long requests.
 Job ShortJobOfCaller(const ServiceContext& context, const Caller& caller, CallerWork work);
+// Returns a job for work that is done at once and waits for nothing, by gRPC's own thread.
+Job JobAtOnce(const Caller& caller, CallerWork work);
 // Returns a job that finds the caller's session, as FindSession does, and runs on its strand. The
 // call is finished when everything is kept that the work may have seen, and soon with NOT_FOUND
 // when the session is deleted meanwhile.

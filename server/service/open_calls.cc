@@ -17,6 +17,16 @@ namespace {
 // Time after which another stream may have ended, or another daemon may serve.
 constexpr std::chrono::seconds kRetryDelay{1};
 
+absl::Status Full(const std::string& why) {
+  return Refuse(absl::StatusCode::kResourceExhausted, why,
+                {.reason = kBusy, .retry_delay = kRetryDelay});
+}
+
+absl::Status Unread(int64_t bytes) {
+  return Full(absl::StrCat("the tenant's clients have left answers of ", bytes >> 20,
+                           " MiB unread; read them first"));
+}
+
 }  // namespace
 
 absl::Status ShuttingDown() {
@@ -31,24 +41,19 @@ absl::Status Moving() {
 }
 
 absl::Status OpenCalls::CheckRoom(Kind kind, const std::string& tenant) const {
-  const auto full = [](const std::string& why) {
-    return Refuse(absl::StatusCode::kResourceExhausted, why,
-                  {.reason = kBusy, .retry_delay = kRetryDelay});
-  };
   const auto share = shares_.find(tenant);
   const auto place = static_cast<size_t>(kind);
   if (kind == Kind::kUnary) {
     if (share == shares_.end() || share->second.answer_bytes < kMaxUnreadBytes) {
       return absl::OkStatus();
     }
-    return full(absl::StrCat("the tenant's clients have left answers of ",
-                             share->second.answer_bytes >> 20, " MiB unread; read them first"));
+    return Unread(share->second.answer_bytes);
   }
   if (open_[place] >= kMaxStreams) {
-    return full(absl::StrCat("the daemon serves at most ", kMaxStreams, " streams at a time"));
+    return Full(absl::StrCat("the daemon serves at most ", kMaxStreams, " streams at a time"));
   }
   if (share != shares_.end() && share->second.open[place] >= kMaxStreamsOfTenant) {
-    return full(absl::StrCat("the daemon serves at most ", kMaxStreamsOfTenant,
+    return Full(absl::StrCat("the daemon serves at most ", kMaxStreamsOfTenant,
                              " streams of a tenant at a time"));
   }
   return absl::OkStatus();
@@ -85,10 +90,13 @@ void OpenCalls::Leave(const Ticket& ticket) {
   left_.notify_all();
 }
 
-void OpenCalls::Ticket::HoldAnswer(int64_t bytes) {
+absl::Status OpenCalls::Ticket::HoldAnswer(int64_t bytes) {
   const std::lock_guard lock(calls_.mutex_);
+  int64_t& unread = calls_.shares_[tenant_].answer_bytes;
+  if (bytes > kSmallAnswer && unread > 0 && bytes > kMaxUnreadBytes - unread) return Unread(unread);
   answer_bytes_ = bytes;
-  calls_.shares_[tenant_].answer_bytes += bytes;
+  unread += bytes;
+  return absl::OkStatus();
 }
 
 int OpenCalls::Count(Kind kind) const {

@@ -39,8 +39,11 @@ class OpenCalls {
     Ticket& operator=(const Ticket&) = delete;
 
     // Counts the bytes of an answer until the call leaves, which is when the client has read it.
-    // Must be called at most once.
-    void HoldAnswer(int64_t bytes);
+    // RESOURCE_EXHAUSTED where the tenant's clients would leave more than kMaxUnreadBytes unread;
+    // the answer must not be sent then. Never refuses the only answer, nor one of up to
+    // kSmallAnswer bytes, as those are of most calls that change something. Must be called at most
+    // once.
+    absl::Status HoldAnswer(int64_t bytes);
 
    private:
     friend class OpenCalls;
@@ -67,6 +70,7 @@ class OpenCalls {
   static constexpr int kMaxStreams = 10'000;
   static constexpr int kMaxStreamsOfTenant = kMaxStreams / 2;
   static constexpr int64_t kMaxUnreadBytes = 256 << 20;
+  static constexpr int64_t kSmallAnswer = 4 << 10;
 
  private:
   static constexpr int kKinds = 3;

@@ -143,16 +143,14 @@ SessionService::Unary* SessionService::GetSession(Context* call,
 SessionService::Unary* SessionService::ListSessions(Context* call,
                                                     const v1::ListSessionsRequest* request,
                                                     v1::ListSessionsResponse* response) {
-  if (context_.sessions.shared()) {
-    return ForCaller(
-        {call, "ListSessions", request, response}, [=, this](const Caller& caller, const Stop&) {
-          return Deliver(ListPage(context_.sessions, caller.tenant, *request), response);
-        });
-  }
-  const auto caller = context_.access.Authorize(*call, "ListSessions");
-  if (!caller.ok()) return FinishAtOnce(call, caller.status());
-  return FinishAtOnce(call,
-                      Deliver(ListPage(context_.sessions, caller->tenant, *request), response));
+  const auto list = [=, this](const Caller& caller, const Stop&) {
+    return Deliver(ListPage(context_.sessions, caller.tenant, *request), response);
+  };
+  const UnaryCall::Call listing{call, "ListSessions", request, response};
+  // Looking into a database that daemons share may wait.
+  if (context_.sessions.shared()) return ForCaller(listing, list);
+  return StartCall(context_, listing,
+                   [&](const Caller& caller) { return JobAtOnce(caller, list); });
 }
 
 SessionService::Unary* SessionService::DeleteSession(Context* call,

@@ -67,11 +67,13 @@ void UnaryCall::PassOn(const std::shared_ptr<State>& state, NodeForwarder::Passa
 void UnaryCall::Finish(State& state, const grpc::Status& status) {
   const std::lock_guard lock(state.mutex);
   if (std::exchange(state.finished, true)) return;
+  absl::Status held;
   if (status.ok()) {
     const size_t bytes = state.call.answer->ByteSizeLong();
-    state.reactor->ticket_->HoldAnswer(static_cast<int64_t>(bytes));
+    held = state.reactor->ticket_->HoldAnswer(static_cast<int64_t>(bytes));
+    if (!held.ok()) state.call.answer->Clear();
   }
-  state.reactor->grpc::ServerUnaryReactor::Finish(status);
+  state.reactor->grpc::ServerUnaryReactor::Finish(held.ok() ? status : ToGrpc(held));
 }
 
 void UnaryCall::OnCancel() { state_->stop.request_stop(); }

@@ -90,8 +90,8 @@ TEST(OpenCalls, RefuseATenantThatLeavesItsAnswersUnread) {
   OpenCalls calls;
   auto large = *calls.Enter(Kind::kUnary, "t");
   const auto small = *calls.Enter(Kind::kUnary, "t");
-  small->HoldAnswer(1);
-  large->HoldAnswer(OpenCalls::kMaxUnreadBytes - 1);
+  EXPECT_TRUE(small->HoldAnswer(1).ok());
+  EXPECT_TRUE(large->HoldAnswer(OpenCalls::kMaxUnreadBytes - 1).ok());
   const absl::Status refused = calls.Enter(Kind::kUnary, "t").status();
   EXPECT_EQ(refused.code(), absl::StatusCode::kResourceExhausted);
   EXPECT_EQ(refused.message(),
@@ -99,6 +99,24 @@ TEST(OpenCalls, RefuseATenantThatLeavesItsAnswersUnread) {
   EXPECT_TRUE(calls.Enter(Kind::kUnary, "other").ok());
   large = nullptr;
   EXPECT_TRUE(calls.Enter(Kind::kUnary, "t").ok());
+}
+
+TEST(OpenCalls, RefuseAnAnswerOfACallThatCameBeforeTheOthersWereLeftUnread) {
+  constexpr int64_t kMost = OpenCalls::kMaxUnreadBytes;
+  OpenCalls calls;
+  std::vector<std::unique_ptr<OpenCalls::Ticket>> tickets;
+  for (int i = 0; i < 6; ++i) tickets.push_back(*calls.Enter(Kind::kUnary, "t"));
+  EXPECT_TRUE(tickets[0]->HoldAnswer(kMost / 2).ok());
+  EXPECT_TRUE(tickets[1]->HoldAnswer(kMost / 2).ok());
+  const absl::Status refused = tickets[2]->HoldAnswer(kMost / 2);
+  EXPECT_EQ(refused.code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_EQ(refused.message(),
+            "the tenant's clients have left answers of 256 MiB unread; read them first");
+  EXPECT_TRUE(tickets[3]->HoldAnswer(OpenCalls::kSmallAnswer).ok());
+  // The refused answer holds nothing. One that is alone may have any size.
+  tickets.erase(tickets.begin(), tickets.begin() + 4);
+  EXPECT_TRUE(tickets[0]->HoldAnswer(2 * kMost).ok());
+  EXPECT_FALSE(tickets[1]->HoldAnswer(kMost / 2).ok());
 }
 
 }  // namespace
