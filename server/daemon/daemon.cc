@@ -84,12 +84,21 @@ void SetKeepalive(grpc::ServerBuilder& builder) {
                              kShortestPingIntervalMs);
 }
 
+// Returns what streams may hold: a quarter of the memory that a tenant and the daemon may have.
+StreamMemory::Limits StreamLimits(int64_t tenant_mb, int64_t all_mb) {
+  StreamMemory::Limits limits;
+  if (tenant_mb > 0) limits.tenant = (tenant_mb << 20) / 4;
+  if (all_mb > 0) limits.all = (all_mb << 20) / 4;
+  return limits;
+}
+
 }  // namespace
 
 Daemon::Daemon(const DaemonOptions& options, ModelLibrary models)
     : options_(options),
       addresses_(options.listen),
       models_(std::move(models)),
+      calls_(StreamLimits(options.limits.memory_mb_per_tenant, options.max_memory_mb)),
       metrics_(Version()),
       readiness_([this] { return journal_->CheckWritable(); }),
       executor_({.threads_per_lane = Threads(options.threads),

@@ -63,7 +63,8 @@ void MeasurementFlow::Accept(v1::StreamMeasurementsRequest request) {
       AuthorizeStream(context_, call_, "StreamMeasurements", session_.get());
   if (!caller.ok()) return End(caller.status());
   if (const absl::Status attached = Attach(*caller, request); !attached.ok()) return End(attached);
-  held_bytes_ += static_cast<int64_t>(request.ByteSizeLong());
+  if (!held_) held_.emplace(context_.calls.memory(), caller->tenant);
+  held_->Add(static_cast<int64_t>(request.ByteSizeLong()));
   inbox_.push_back(std::move(request));
 }
 
@@ -110,6 +111,7 @@ bool MeasurementFlow::PassOn(const absl::Status& refusal) {
   passed_on_ = MeasurementRelay::Start(*std::move(passage), PathOf("StreamMeasurements"), call_,
                                        reactor_, std::move(inbox_.front()));
   inbox_.clear();
+  held_.reset();
   return true;
 }
 
@@ -154,6 +156,8 @@ void MeasurementFlow::EndSoon(const absl::Status& reason) {
 // Sets how the stream ends. The client sends again what was received and not taken.
 void MeasurementFlow::End(const absl::Status& status) {
   if (!end_) end_ = status;
+  for (const auto& request : inbox_) held_->Add(-static_cast<int64_t>(request.ByteSizeLong()));
+  for (const Uncomputed& one : uncomputed_) held_->Add(-one.bytes);
   inbox_.clear();
   left_uncomputed_ = left_uncomputed_ || computing_ || !uncomputed_.empty();
   uncomputed_.clear();
@@ -196,7 +200,13 @@ bool MeasurementFlow::HasRoom() const {
 
 bool MeasurementFlow::MayRead() const {
   return !half_closed_ && !draining_ && !end_ && stage_ != Stage::kFinding &&
-         inbox_.size() < kInbox && held_bytes_ < context_.held_bytes && HasRoom();
+         inbox_.size() < kInbox && MayHoldMore() && HasRoom();
+}
+
+// A stream that holds nothing may always read a message, so that none waits for others.
+bool MeasurementFlow::MayHoldMore() const {
+  if (!held_ || held_->bytes() == 0) return true;
+  return held_->bytes() < context_.held_bytes && held_->HasRoom();
 }
 
 bool MeasurementFlow::AllTaken() const {

@@ -108,6 +108,7 @@ class MeasurementFlow final : public SessionObserver,
   void FinishIfIdle();
   bool HasRoom() const;
   bool MayRead() const;
+  bool MayHoldMore() const;
   bool HasBatch() const;
   bool IsQuicklyTaken(const v1::StreamMeasurementsRequest& request) const;
   // Returns whether nothing is left to be taken and nothing will come.
@@ -149,7 +150,8 @@ class MeasurementFlow final : public SessionObserver,
   v1::StreamMeasurementsRequest reading_into_;
   std::deque<v1::StreamMeasurementsRequest> inbox_;
   std::deque<Uncomputed> uncomputed_;
-  int64_t held_bytes_ = 0;      // of the messages in the inbox and of batches not yet computed
+  // Of the messages in the inbox and of batches not yet computed; none before the first message.
+  std::optional<StreamMemory::Share> held_;
   std::list<Answered> outbox_;  // the first one is being written or is the next
   int64_t kept_ = 0;
   Stage stage_ = Stage::kNone;

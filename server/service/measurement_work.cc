@@ -65,7 +65,7 @@ void MeasurementFlow::TakeOne(std::unique_lock<std::mutex>& lock) {
     uncomputed->bytes = bytes;
     uncomputed_.push_back(*uncomputed);
   } else {
-    held_bytes_ -= bytes;
+    held_->Add(-bytes);
   }
   if (!answered.ok()) End(answered);
 }
@@ -105,7 +105,7 @@ void MeasurementFlow::Compute() {
   const absl::Status computed = stop_.Name(Guarded([&] { return ComputeTurn(turn, last); }));
   lock.lock();
   if (!computed.ok()) End(computed);
-  for (const Uncomputed& one : turn) held_bytes_ -= one.bytes;
+  for (const Uncomputed& one : turn) held_->Add(-one.bytes);
   computing_ = false;
   if (last) End(at_end);
   Advance();

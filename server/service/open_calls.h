@@ -16,6 +16,8 @@
 #include <utility>
 #include <vector>
 
+#include "server/service/stream_memory.h"
+
 namespace polyest::internal {
 
 // Is a stream that can be asked to end. Drain is called from any thread and must not wait.
@@ -28,6 +30,12 @@ class Drainable {
 class OpenCalls {
  public:
   enum class Kind { kUnary, kWriter, kWatcher };
+
+  OpenCalls() = default;
+  explicit OpenCalls(const StreamMemory::Limits& memory) : memory_(memory) {}
+
+  // Weighs what the streams hold.
+  StreamMemory& memory() { return memory_; }
 
   // Keeps a call open as long as it exists.
   class Ticket {
@@ -87,6 +95,7 @@ class OpenCalls {
   void DrainKind(Kind kind);
   int& open(Kind kind) { return open_[static_cast<int>(kind)]; }
 
+  StreamMemory memory_;
   mutable std::mutex mutex_;
   std::condition_variable left_;
   bool draining_ = false;

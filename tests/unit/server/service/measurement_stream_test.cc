@@ -154,6 +154,29 @@ TEST_F(MeasurementStreamTest, ReadsNoMoreWhileTooManyBytesWaitToBeComputed) {
   stream->OnDone();
 }
 
+TEST_F(MeasurementStreamTest, ReadsOneMessageAtATimeWhileTheTenantsStreamsHoldTooMuch) {
+  ServiceContext context = Context();
+  const std::string tenant = access_->Authorize(call_, "GetStatus")->tenant;
+  StreamMemory::Share others(calls_.memory(), tenant);
+  others.Add(StreamMemory::Limits().tenant);
+  auto* const stream = new MeasurementStream(context, call_);
+  Peer peer(*stream);
+  Request hello;
+  hello.set_session("sessions/a");
+  peer.Give(hello);
+  const auto session = sessions_->All().front();
+  std::latch go_on(1);
+  ASSERT_TRUE(session->strand().Submit([&] { go_on.wait(); }).ok());
+  peer.Give(Batch(1));
+  while (session->taken().sequence < 1) std::this_thread::yield();
+  EXPECT_FALSE(peer.Asks());
+  go_on.count_down();
+  peer.Give(Batch(2));  // once the first is computed
+  stream->OnCancel();
+  EXPECT_EQ(peer.AwaitEnd(), grpc::StatusCode::CANCELLED);
+  stream->OnDone();
+}
+
 TEST_F(MeasurementStreamTest, TakesBatchesOfASessionInMemoryWhileOthersCompute) {
   std::latch go_on(1);
   ASSERT_TRUE(executor_.Submit("others", [&] { go_on.wait(); }).ok());
