@@ -77,7 +77,7 @@ class BackupParts {
 class BackupCall final : public grpc::ServerWriteReactor<v1::DownloadBackupResponse> {
  public:
   BackupCall(const ServiceContext& context, const grpc::CallbackServerContext& call)
-      : flow_(std::make_shared<BackupFlow>(context.executor)) {
+      : flow_(std::make_shared<BackupFlow>(context.executor, context.calls.memory())) {
     const absl::StatusOr<Caller> admitted =
         AdmitStream(context, call, "DownloadBackup", OpenCalls::Kind::kWatcher, flow_, ticket_);
     if (!admitted.ok()) {
@@ -85,8 +85,7 @@ class BackupCall final : public grpc::ServerWriteReactor<v1::DownloadBackupRespo
       return;
     }
     const auto parts = std::make_shared<BackupParts>(context);
-    flow_->OnStart(this, absl::StrCat(admitted->tenant, "/calls"),
-                   [parts](const Stop& stop) { return parts->Next(stop); });
+    flow_->OnStart(this, admitted->tenant, [parts](const Stop& stop) { return parts->Next(stop); });
   }
 
   void OnWriteDone(bool ok) override { flow_->OnWritten(ok); }

@@ -1,7 +1,5 @@
 #include "server/service/export_call.h"
 
-#include <absl/strings/str_cat.h>
-
 #include <utility>
 
 #include "core/common/status.h"
@@ -49,15 +47,15 @@ ExportFlow::PassOn PassOnFor(const ServiceContext& context, grpc::CallbackServer
 
 ExportCall::ExportCall(ServiceContext& context, grpc::CallbackServerContext& call,
                        const v1::ExportSessionRequest& request)
-    : flow_(std::make_shared<ExportFlow>(context.executor, PassOnFor(context, call, request))) {
+    : flow_(std::make_shared<ExportFlow>(context.executor, context.calls.memory(),
+                                         PassOnFor(context, call, request))) {
   const absl::StatusOr<Caller> admitted =
       AdmitStream(context, call, "ExportSession", OpenCalls::Kind::kWatcher, flow_, ticket_);
   if (!admitted.ok()) {
     flow_->OnStart(this, "", admitted.status());
     return;
   }
-  flow_->OnStart(this, absl::StrCat(admitted->tenant, "/calls"),
-                 RecordsOf(context, *admitted, request.name()));
+  flow_->OnStart(this, admitted->tenant, RecordsOf(context, *admitted, request.name()));
 }
 
 void ExportCall::OnDone() {
