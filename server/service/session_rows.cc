@@ -18,7 +18,8 @@ constexpr int64_t kCopies = 3;
 }  // namespace
 
 absl::StatusOr<int64_t> ReadRows(const Session& session, const ResolvedProblem& problem,
-                                 const Stop& stop, v1::Measurements& measurements) {
+                                 const RunCuts& cuts, const Stop& stop,
+                                 v1::Measurements& measurements) {
   POLYEST_RETURN_IF_ERROR(
       session.CheckMemory(kCopies * session.place().rows * LoadedSession::RowBytes(problem)));
   const Model& model = *problem.problem().model;
@@ -30,17 +31,13 @@ absl::StatusOr<int64_t> ReadRows(const Session& session, const ResolvedProblem& 
   const auto append = [&](const JournalBatch& batch) -> absl::Status {
     POLYEST_RETURN_IF_ERROR(stop.Check());
     sequence = batch.sequence;
+    POLYEST_ASSIGN_OR_RETURN(Samples samples, ToSamples(batch.measurements, model));
     if (reorder) {
-      POLYEST_ASSIGN_OR_RETURN(const Samples samples, ToSamples(batch.measurements, model));
       POLYEST_ASSIGN_OR_RETURN(RowReorder::Step step, reorder->Next(samples));
-      AppendRows(step.released, measurements);
+      samples = step.released;
       reorder->Accept(std::move(step));
-      return absl::OkStatus();
     }
-    // Each batch may have units of its own.
-    v1::Measurements converted = batch.measurements;
-    POLYEST_RETURN_IF_ERROR(ToModelUnits(model, converted));
-    AppendRows(converted, measurements);
+    AppendRows(cuts.Keep(std::move(samples)), measurements);
     return absl::OkStatus();
   };
   POLYEST_RETURN_IF_ERROR(session.ReadBatches(0, append));

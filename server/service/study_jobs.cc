@@ -48,14 +48,13 @@ auto Run(const v1::ComputeRegularizationSweepRequest& request, auto&&... of) {
 }
 auto Run(const v1::PredictRequest& request, auto&&... of) { return Predict(request, of...); }
 
-// Selects the studies of a session that run the model themselves, from its problem and its rows,
-// and need no estimator.
+// Selects the studies of the prior, which need nothing of a session but its problem.
 template <typename Request>
-concept RunsTheModel = std::same_as<Request, v1::ComputePropagationRequest> ||
-    std::same_as<Request, v1::ComputeCostGridRequest> ||
+concept IsOfThePrior = std::same_as<Request, v1::ComputePropagationRequest> ||
     std::same_as<Request, v1::ComputeSensitivityRequest>;
 
-// The overloads of OnStrand answer a study of a session from its estimator, on its strand.
+// The overloads of OnStrand answer a study of a session on its strand: from its estimator, or from
+// its rows.
 
 absl::Status OnStrand(const v1::ComputeEstimateRequest& request, Session& session,
                       const ServiceContext&, const Stop& stop,
@@ -87,6 +86,22 @@ absl::Status OnStrand(const v1::ComputeExperimentDesignRequest& request, Session
   return session.WithEstimator(design, stop);
 }
 
+absl::Status OnStrand(v1::ComputeCostGridRequest request, Session& session,
+                      const ServiceContext& context, const Stop& stop,
+                      v1::ComputeCostGridResponse& response) {
+  v1::Experiment& experiment = *request.mutable_subject()->mutable_experiment();
+  POLYEST_ASSIGN_OR_RETURN(*experiment.mutable_problem(), session.ReadProblem());
+  POLYEST_ASSIGN_OR_RETURN(const ResolvedProblem resolved,
+                           ToProblem(experiment.problem(), context.models));
+  POLYEST_ASSIGN_OR_RETURN(const RunCuts cuts, session.Cuts(stop));
+  POLYEST_ASSIGN_OR_RETURN(const int64_t sequence, ReadRows(session, resolved, cuts, stop,
+                                                            *experiment.mutable_measurements()));
+  POLYEST_ASSIGN_OR_RETURN(response,
+                           Run(request, ThreadsOf(context), stop, context.models, ProblemLimits()));
+  response.set_sequence(sequence);
+  return absl::OkStatus();
+}
+
 template <typename Request, typename Response>
 absl::Status OnStrand(const Request& request, Session& session, const ServiceContext&,
                       const Stop& stop, Response& response) {
@@ -98,26 +113,15 @@ absl::Status OnStrand(const Request& request, Session& session, const ServiceCon
   return session.WithEstimator(answer, stop);
 }
 
-// Runs a study on the problem and the rows of a session. The limits of a problem do not apply,
+// Runs a study of the prior on the problem of a session. The limits of a problem do not apply,
 // because a session that exists stays, whatever the limits are now.
-template <RunsTheModel Request, typename Response>
-absl::Status OfStoredExperiment(Request request, const Session& session,
-                                const ServiceContext& context, const Stop& stop,
-                                Response& response) {
-  v1::Experiment& experiment = *request.mutable_subject()->mutable_experiment();
-  POLYEST_ASSIGN_OR_RETURN(*experiment.mutable_problem(), session.ReadProblem());
-  int64_t sequence = 0;
-  if constexpr (std::same_as<Request, v1::ComputeCostGridRequest>) {
-    POLYEST_ASSIGN_OR_RETURN(const ResolvedProblem resolved,
-                             ToProblem(experiment.problem(), context.models));
-    POLYEST_ASSIGN_OR_RETURN(sequence,
-                             ReadRows(session, resolved, stop, *experiment.mutable_measurements()));
-  }
+template <IsOfThePrior Request, typename Response>
+absl::Status OfStoredProblem(Request request, const Session& session, const ServiceContext& context,
+                             const Stop& stop, Response& response) {
+  POLYEST_ASSIGN_OR_RETURN(*request.mutable_subject()->mutable_experiment()->mutable_problem(),
+                           session.ReadProblem());
   POLYEST_ASSIGN_OR_RETURN(response,
                            Run(request, ThreadsOf(context), stop, context.models, ProblemLimits()));
-  if constexpr (std::same_as<Request, v1::ComputeCostGridRequest>) {
-    response.set_sequence(sequence);
-  }
   return absl::OkStatus();
 }
 
@@ -137,12 +141,12 @@ absl::StatusOr<Job> StudyJob(const ServiceContext& context, const Caller& caller
           response);
     });
   }
-  if constexpr (RunsTheModel<Request>) {
+  if constexpr (IsOfThePrior<Request>) {
     const auto run = [=, &context](const Caller& asking, const Stop& stop) -> absl::Status {
       POLYEST_ASSIGN_OR_RETURN(const auto session,
                                FindSession(context, asking, "subject.session", subject.session()));
       POLYEST_RETURN_IF_ERROR(context.sessions.services().memory.Check());
-      return OfStoredExperiment(*request, *session, context, stop, *response);
+      return OfStoredProblem(*request, *session, context, stop, *response);
     };
     return JobOfCaller(context, caller, run);
   } else {

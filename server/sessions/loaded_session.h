@@ -80,6 +80,8 @@ class LoadedSession {
   absl::Status Renew(const Stop& stop);
   // Returns the seconds of measurements that the estimator has, over all runs.
   double measured_s() const { return computed_.measured_s; }
+  // Returns the rows that are left out because the model could not be computed.
+  const RunCuts& cuts() const { return computed_.cuts; }
   // Returns the number of the last batch that the estimator has.
   int64_t sequence() const { return computed_.sequence; }
   // Gives the estimator the batches up to `sequence`, which the journal must keep, without

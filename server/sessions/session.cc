@@ -251,6 +251,12 @@ void Session::CountEstimate(const v1::Estimate& estimate, Clock::duration durati
   }
 }
 
+absl::StatusOr<RunCuts> Session::Cuts(const Stop& stop) {
+  POLYEST_RETURN_IF_ERROR(Process(stop));
+  POLYEST_ASSIGN_OR_RETURN(const auto loaded, Loaded(stop));
+  return loaded->cuts();
+}
+
 absl::Status Session::WithEstimator(const LoadedSession::Work& work, const Stop& stop) {
   POLYEST_ASSIGN_OR_RETURN(const auto loaded, Loaded(stop));
   const Computing computing(*this, *loaded);

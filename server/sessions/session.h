@@ -170,6 +170,8 @@ class Session : public std::enable_shared_from_this<Session> {
   absl::StatusOr<SharedEstimate> LatestEstimate(const Stop& stop);
   // Processes everything added, then returns the estimate as LatestEstimate does.
   absl::StatusOr<SharedEstimate> CurrentEstimate(const Stop& stop);
+  // Processes everything added, then returns which rows are left out of it.
+  absl::StatusOr<RunCuts> Cuts(const Stop& stop);
   // Returns the history of the estimates. Loads nothing but the history.
   absl::StatusOr<v1::EstimateHistory> History();
   // Processes everything added and calls `work` with the estimator, which has everything added and

@@ -144,20 +144,6 @@ v1::Measurements::Channel Moved(const v1::Measurements::Channel& channel,
 
 }  // namespace
 
-absl::Status ToModelUnits(const Model& model, v1::Measurements& measurements) {
-  for (int i = 0; i < measurements.channels_size(); ++i) {
-    v1::Measurements::Channel& channel = *measurements.mutable_channels(i);
-    POLYEST_ASSIGN_OR_RETURN(
-        const UnitConversion conversion,
-        ConversionOf(channel, model, absl::StrFormat("measurements.channels[%d]", i)));
-    channel.clear_unit();
-    if (conversion.IsIdentity()) continue;
-    std::transform(channel.values().begin(), channel.values().end(),
-                   channel.mutable_values()->begin(), conversion);
-  }
-  return absl::OkStatus();
-}
-
 absl::StatusOr<Samples> ToSamples(const v1::Measurements& measurements, const Model& model) {
   POLYEST_RETURN_IF_ERROR(CheckTime(measurements));
   Samples samples;

@@ -16,10 +16,6 @@ namespace polyest::internal {
 // names the field, the channel and the row.
 absl::StatusOr<Samples> ToSamples(const v1::Measurements& measurements, const Model& model);
 
-// Converts the values of all channels to the units of the model, and removes their units.
-// INVALID_ARGUMENT names the channel and the units.
-absl::Status ToModelUnits(const Model& model, v1::Measurements& measurements);
-
 // Appends the rows of a batch to those of the batches before it. In the rows of a batch that lacks
 // a channel, the samples of that channel are missing.
 void AppendRows(const v1::Measurements& batch, v1::Measurements& all);

@@ -49,7 +49,7 @@ TEST_F(SessionRowsTest, AreNotReadBeyondTheMemoryOfTheTenant) {
   const ResolvedProblem problem = ToProblem(SmallProblem(), models_).value();
   Add(1, 1, 100);
   v1::Measurements rows;
-  const auto read = ReadRows(*session_, problem, {}, rows);
+  const auto read = ReadRows(*session_, problem, {}, {}, rows);
   ASSERT_TRUE(read.ok()) << read.status();
   EXPECT_EQ(*read, 1);
   EXPECT_EQ(rows.time_s_size(), 100);
@@ -57,7 +57,7 @@ TEST_F(SessionRowsTest, AreNotReadBeyondTheMemoryOfTheTenant) {
   // Three times 32 B a row.
   Add(2, 101, 12'000);
   rows.Clear();
-  const absl::Status refused = ReadRows(*session_, problem, {}, rows).status();
+  const absl::Status refused = ReadRows(*session_, problem, {}, {}, rows).status();
   EXPECT_EQ(refused.code(), absl::StatusCode::kResourceExhausted);
   EXPECT_THAT(
       refused.message(),
@@ -65,6 +65,18 @@ TEST_F(SessionRowsTest, AreNotReadBeyondTheMemoryOfTheTenant) {
                          "a tenant may hold, 1 MiB (--max-tenant-memory-mb)"));
   EXPECT_EQ(RefusalOf(refused)->limit, "--max-tenant-memory-mb");
   EXPECT_EQ(rows.time_s_size(), 0);
+}
+
+TEST_F(SessionRowsTest, AreThoseThatTheEstimateHas) {
+  const ResolvedProblem problem = ToProblem(SmallProblem(), models_).value();
+  Add(1, 1, 60);
+  Add(2, 61, 60);
+  RunCuts cuts;
+  cuts.Add({.run = 0, .time_s = 50e-4}, /*first_of_record=*/false, "the model failed");
+  v1::Measurements rows;
+  ASSERT_EQ(ReadRows(*session_, problem, cuts, {}, rows).value(), 2);
+  EXPECT_EQ(rows.time_s_size(), 49);
+  EXPECT_EQ(rows.channels(0).values_size(), 49);
 }
 
 }  // namespace
