@@ -144,13 +144,15 @@ JointDensity WeightedJointDensity(const ConstVectorRef& first, const ConstVector
 
 std::vector<Eigen::Index> EquallyWeighted(const ConstVectorRef& weights, int count) {
   POLYEST_CHECK(weights.size() > 0 && count >= 0);
+  constexpr double kGolden = 0.6180339887498949;  // (√5 − 1)/2
   std::vector<Eigen::Index> chosen;
   chosen.reserve(static_cast<size_t>(count));
   Eigen::Index source = 0;
   double cumulative = weights[0];
   const double all = weights.sum();
   for (int i = 0; i < count; ++i) {
-    const double pointer = all * (i + 0.5) / count;
+    const double place = 0.5 + i * kGolden;  // in its stretch, without the whole part
+    const double pointer = all * (i + place - std::floor(place)) / count;
     while (cumulative < pointer && source + 1 < weights.size()) cumulative += weights[++source];
     chosen.push_back(source);
   }

@@ -34,8 +34,10 @@ DensityEstimate WeightedDensity(const ConstVectorRef& draws, const ConstVectorRe
 JointDensity WeightedJointDensity(const ConstVectorRef& first, const ConstVectorRef& second,
                                   const ConstVectorRef& weights, int bins);
 
-// Returns the rows of `count` equally weighted draws among the weighted ones, by systematic
-// resampling with evenly spaced pointers: deterministic, and each draw as often as its weight says.
+// Returns the rows of `count` equally weighted draws among the weighted ones, each about as often
+// as its weight says. The pointers are one in each stretch of 1/count of the weight, at places that
+// a golden-ratio sequence gives: evenly spaced ones would go in step with draws that are a
+// low-discrepancy sequence, and miss whole layers of them.
 std::vector<Eigen::Index> EquallyWeighted(const ConstVectorRef& weights, int count);
 
 }  // namespace polyest::internal

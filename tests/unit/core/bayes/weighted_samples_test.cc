@@ -106,5 +106,34 @@ TEST(EquallyWeighted, TakesEachDrawAsOftenAsItsWeightSays) {
   EXPECT_TRUE(EquallyWeighted(kWeights, 0).empty());
 }
 
+// The radical inverse of a number in a base: the points of Halton's sequence in one dimension.
+double RadicalInverse(int number, int base) {
+  double inverse = 0;
+  for (double unit = 1.0 / base; number > 0; number /= base, unit /= base) {
+    inverse += unit * (number % base);
+  }
+  return inverse;
+}
+
+// Draws at a stride that is a power of the base are all in one layer. As many random draws have the
+// mean of a uniform variable to √(1/12/count), and its standard deviation to √(1/60/count).
+TEST(EquallyWeighted, IsNotInStepWithALowDiscrepancySequence) {
+  constexpr int kDraws = 6 * 6 * 6 * 25;
+  const Vector weights = Vector::Constant(kDraws, 1.0 / kDraws);
+  for (const int base : {2, 3, 5}) {
+    for (const int count : {100, 200, 216, 300, 400, 600, 675}) {
+      Vector chosen(count);
+      int i = 0;
+      for (const Eigen::Index row : EquallyWeighted(weights, count)) {
+        chosen[i++] = RadicalInverse(static_cast<int>(row), base);
+      }
+      const double deviation = std::sqrt((chosen.array() - chosen.mean()).square().mean());
+      EXPECT_NEAR(chosen.mean(), 0.5, 3 * std::sqrt(1.0 / 12 / count)) << base << ' ' << count;
+      EXPECT_NEAR(deviation, std::sqrt(1.0 / 12), 3 * std::sqrt(1.0 / 60 / count))
+          << base << ' ' << count;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace polyest::internal
