@@ -347,8 +347,10 @@ bool Daemon::Stop() {
   }
   if (handover_ != nullptr) handover_->LetGo(drained);
   stop_.request_stop();
+  const auto flushed = std::chrono::steady_clock::now() + kFlushTime;
+  bool web_ended = true;
   for (WebPort* const port : {web_.get(), umbridge_.get()}) {
-    if (port != nullptr) port->Stop(std::chrono::steady_clock::now() + kFlushTime);
+    if (port != nullptr && !port->Stop(flushed, flushed + kGiveUp)) web_ended = false;
   }
   // gRPC waits for every call, also for those that do not look at their stop.
   std::promise<void> closed;
@@ -362,7 +364,7 @@ bool Daemon::Stop() {
   });
   const auto deadline = std::chrono::steady_clock::now() + kGiveUp;
   return is_closed.wait_until(deadline) == std::future_status::ready &&
-         executor_.AwaitIdle(deadline) && intake_.AwaitIdle(deadline);
+         executor_.AwaitIdle(deadline) && intake_.AwaitIdle(deadline) && web_ended;
 }
 
 Daemon::~Daemon() {

@@ -8,11 +8,13 @@
 
 #include "proto/wire/refusal/refusal.h"
 #include "server/security/method_roles.h"
+#include "server/service/open_calls.h"
 #include "server/service/status_mapping.h"
 #include "server/telemetry/request_id.h"
 #include "server/telemetry/structured_log.h"
 #include "server/web/call_metadata.h"
 #include "server/web/transcode.h"
+#include "server/web/wake_up.h"
 #include "server/web/web_answers.h"
 
 namespace polyest::internal {
@@ -47,6 +49,10 @@ WebCall::Request CallFor(const WebCall::Request& client, std::string method, std
 
 std::string Event(absl::string_view name, absl::string_view data) {
   return absl::StrCat("event: ", name, "\ndata: ", data, "\n\n");
+}
+
+HttpAnswer ClientGone() {
+  return ErrorAnswer(499, StatusCode::CANCELLED, "the client has closed the connection");
 }
 
 }  // namespace
@@ -194,10 +200,12 @@ std::optional<v1::Session> Gateway::SessionOf(const HttpRequest& request,
 
 std::optional<HttpAnswer> Gateway::Read(const WebMethod& method, const HttpRequest& request,
                                         const std::string& body, std::string& message) const {
-  Turns::Turn turn;
+  std::unique_ptr<Turns::Turn> turn;
   if (body.size() > kLargeRequest) {
     const std::string host = request.peer.substr(0, request.peer.rfind(':'));
     turn = large_requests_.Take(request.Header("Authorization").value_or(host));
+    if (turn == nullptr) return ErrorAnswer(ToRpcStatus(ShuttingDown()));
+    if (WakeUp::IsGone(request.client)) return ClientGone();
   }
   const rpc::Status read = FromJsonText(body, *method.method->input_type(), message);
   if (read.code() != StatusCode::OK) return ErrorAnswer(read);
@@ -213,7 +221,7 @@ HttpAnswer Gateway::AnswerOnce(WebCall& call, const WebMethod& method,
   std::string message;
   const std::optional<grpc::Status> status = call.AwaitOnly(request.client, message);
   if (!status) {
-    return ErrorAnswer(499, StatusCode::CANCELLED, "the client has closed the connection");
+    return ClientGone();
   }
   HttpAnswer answer{.content_type = kJson};
   if (status->ok()) {

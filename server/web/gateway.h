@@ -55,6 +55,7 @@ class Gateway final : public HttpHandler {
   HttpAnswer Answer(const HttpRequest& request, const std::string& body) const override;
   HttpAnswer Refusal(int status, std::string_view why) const override;
   void OnAnswer(int status) const override { options_.count(status); }
+  void Stop() const override { large_requests_.Stop(); }
 
  private:
   // A place among the streams, which is given back when its last owner goes.

@@ -57,6 +57,8 @@ class HttpHandler {
   virtual HttpAnswer Refusal(int status, std::string_view why) const = 0;
   // Notes the answer to a request before it is sent.
   virtual void OnAnswer(int status) const = 0;
+  // Ends what requests wait for, which are answered soon then. May be called while others are.
+  virtual void Stop() const {}
 };
 
 }  // namespace polyest::internal

@@ -29,6 +29,20 @@ void WakeUp::Clear() const {
   (void)!read(event_, &count, sizeof(count));
 }
 
+namespace {
+
+// The events of a client's socket that tell of its end.
+bool TellsOfEnd(const pollfd& client) {
+  return (client.revents & (POLLRDHUP | POLLHUP | POLLERR)) != 0;
+}
+
+}  // namespace
+
+bool WakeUp::IsGone(int client) {
+  pollfd looked{client, POLLRDHUP, 0};
+  return poll(&looked, 1, 0) > 0 && TellsOfEnd(looked);
+}
+
 WakeUp::Reason WakeUp::Await(int client, Clock::time_point deadline) const {
   constexpr int64_t kLongestMs = 60'000;
   const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - Clock::now()).count();
@@ -36,7 +50,7 @@ WakeUp::Reason WakeUp::Await(int client, Clock::time_point deadline) const {
   pollfd waiting[] = {{event_, POLLIN, 0}, {client, POLLRDHUP, 0}};
   const int happened = poll(waiting, 2, static_cast<int>(std::min(left, kLongestMs)));
   POLYEST_CHECK(happened >= 0 || errno == EINTR);
-  const bool gone = happened > 0 && (waiting[1].revents & (POLLRDHUP | POLLHUP | POLLERR)) != 0;
+  const bool gone = happened > 0 && TellsOfEnd(waiting[1]);
   return gone ? Reason::kClientGone : Reason::kSignal;
 }
 

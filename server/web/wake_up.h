@@ -28,6 +28,8 @@ class WakeUp {
   // Waits for a signal, at most until `deadline`, and for the end of the client's connection.
   // `client` is its socket; negative: there is no client. May return without a reason: kSignal.
   Reason Await(int client, Clock::time_point deadline) const;
+  // Returns whether the client has closed its connection.
+  static bool IsGone(int client);
 
  private:
   const int event_;

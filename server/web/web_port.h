@@ -46,13 +46,16 @@ class WebPort {
 
   int port() const { return server_->port(); }
   // Begins to answer. `channel` leads into the daemon's own server, which must outlive the port, or
-  // Stop.
+  // a Stop that has returned true.
   void Serve(std::shared_ptr<grpc::Channel> channel);
   // Reads the certificates again; keeps the old ones if that fails.
   absl::Status ReloadTls();
   // Takes no more requests, waits for the answers under way until `deadline`, and closes all
-  // connections.
-  void Stop(std::chrono::steady_clock::time_point deadline) { server_->Stop(deadline); }
+  // connections. Returns whether nothing is left of them by `give_up`.
+  bool Stop(std::chrono::steady_clock::time_point deadline,
+            std::chrono::steady_clock::time_point give_up) {
+    return server_->Stop(deadline, give_up);
+  }
 
  private:
   WebPort(Options options, std::unique_ptr<WebServer> server)

@@ -49,7 +49,9 @@ absl::StatusOr<std::unique_ptr<WebServer>> WebServer::Open(const Options& option
 WebServer::WebServer(const Options& options)
     : options_(options), port_(options.port), memory_(options.body_memory_bytes) {}
 
-WebServer::~WebServer() { Stop(std::chrono::steady_clock::now()); }
+WebServer::~WebServer() {
+  Stop(std::chrono::steady_clock::now(), std::chrono::steady_clock::time_point::max());
+}
 
 void WebServer::UseTls(std::shared_ptr<SSL_CTX> tls) {
   const std::lock_guard lock(mutex_);
@@ -57,6 +59,7 @@ void WebServer::UseTls(std::shared_ptr<SSL_CTX> tls) {
 }
 
 void WebServer::Serve(const HttpHandler& handler) {
+  handler_ = &handler;
   accepting_ = std::thread([this, &handler] { AcceptAll(handler); });
 }
 
@@ -124,16 +127,19 @@ void WebServer::Reap() {
   for (Connection& connection : over) connection.thread.join();
 }
 
-void WebServer::Stop(std::chrono::steady_clock::time_point deadline) {
+bool WebServer::Stop(std::chrono::steady_clock::time_point deadline,
+                     std::chrono::steady_clock::time_point give_up) {
   sockets_.Stop();
   if (accepting_.joinable()) accepting_.join();
+  if (handler_ != nullptr) handler_->Stop();
   {
     std::unique_lock lock(mutex_);
     ended_.wait_until(lock, deadline, [this] { return open_.empty(); });
     for (const Connection& connection : open_) connection.socket->Shutdown();
-    ended_.wait(lock, [this] { return open_.empty(); });
+    if (!ended_.wait_until(lock, give_up, [this] { return open_.empty(); })) return false;
   }
   Reap();
+  return true;
 }
 
 }  // namespace polyest::internal

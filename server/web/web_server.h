@@ -44,9 +44,11 @@ class WebServer {
   void UseTls(std::shared_ptr<SSL_CTX> tls);
   // Begins to serve. `handler` must outlive the server, or Stop.
   void Serve(const HttpHandler& handler);
-  // Takes no more connections, closes those that are idle, and waits for the others until
-  // `deadline`; those still open then are closed, too.
-  void Stop(std::chrono::steady_clock::time_point deadline);
+  // Takes no more connections, stops the handler, closes connections that are idle, and waits for
+  // the others until `deadline`; those still open then are closed, too. Returns whether their
+  // threads have ended by `give_up`: one that reads a large request does not look at the stop.
+  bool Stop(std::chrono::steady_clock::time_point deadline,
+            std::chrono::steady_clock::time_point give_up);
 
  private:
   struct Connection {
@@ -77,6 +79,7 @@ class WebServer {
   Connections open_;
   Connections over_;  // whose threads have ended or are about to
   std::map<std::string, int> hosts_;
+  const HttpHandler* handler_ = nullptr;  // null until it serves
   std::thread accepting_;
 };
 

@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
+#include <memory>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -16,7 +19,8 @@ TEST(Turns, AreTakenByOneAtATime) {
   for (int i = 0; i < 8; ++i) {
     threads.emplace_back([&, who = std::to_string(i % 3)] {
       for (int k = 0; k < 100; ++k) {
-        const Turns::Turn turn = turns.Take(who);
+        const std::unique_ptr<Turns::Turn> turn = turns.Take(who);
+        EXPECT_NE(turn, nullptr);
         EXPECT_EQ(++busy, 1);
         ++done;
         --busy;
@@ -25,6 +29,22 @@ TEST(Turns, AreTakenByOneAtATime) {
   }
   for (std::thread& thread : threads) thread.join();
   EXPECT_EQ(done, 800);
+}
+
+TEST(Turns, EndTheWaitsAtAStopButNotTheTurn) {
+  Turns turns;
+  std::unique_ptr<Turns::Turn> turn = turns.Take("a");
+  std::vector<std::thread> threads;
+  std::atomic<int> refused = 0;
+  for (const char* who : {"a", "a", "b", "b"}) {
+    threads.emplace_back([&, who] { refused += turns.Take(who) == nullptr ? 1 : 0; });
+  }
+  turns.Stop();
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(refused, 4);
+  EXPECT_EQ(turns.Take("c"), nullptr);
+  turn = nullptr;
+  EXPECT_EQ(turns.Take("c"), nullptr);
 }
 
 }  // namespace
