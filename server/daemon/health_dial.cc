@@ -1,11 +1,13 @@
 #include "server/daemon/health_dial.h"
 
+#include <netinet/in.h>
 #include <poll.h>
 #include <sys/socket.h>
 #include <sys/types.h>
 
 #include <algorithm>
 #include <cstdint>
+#include <cstring>
 #include <string>
 
 namespace polyest::internal {
@@ -72,6 +74,24 @@ bool TakeAnswer(std::string& bytes) {
 }
 
 }  // namespace
+
+std::vector<sockaddr_storage> AddressesToDial(const sockaddr_storage& address) {
+  std::vector<sockaddr_storage> addresses{address};
+  auto& four = reinterpret_cast<sockaddr_in&>(addresses.front());
+  auto& six = reinterpret_cast<sockaddr_in6&>(addresses.front());
+  if (address.ss_family == AF_INET && four.sin_addr.s_addr == htonl(INADDR_ANY)) {
+    four.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  } else if (address.ss_family == AF_INET6 && IN6_IS_ADDR_UNSPECIFIED(&six.sin6_addr)) {
+    addresses.push_back(address);
+    reinterpret_cast<sockaddr_in6&>(addresses.front()).sin6_addr = in6addr_loopback;
+    auto& mapped = reinterpret_cast<sockaddr_in6&>(addresses.back()).sin6_addr;
+    mapped = {};
+    mapped.s6_addr[10] = mapped.s6_addr[11] = 0xFF;
+    const in_addr_t loopback = htonl(INADDR_LOOPBACK);
+    std::memcpy(&mapped.s6_addr[12], &loopback, sizeof(loopback));
+  }
+  return addresses;
+}
 
 bool AnswersHealthCall(int socket, Clock::time_point deadline) {
   const std::string call = HealthCall();

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <iterator>
+#include <optional>
 
 #include "server/daemon/health_dial.h"
 #include "server/net/descriptor.h"
@@ -21,18 +22,6 @@ constexpr int64_t kMaxConnections = 10'000;
 constexpr int64_t kReserve = 512;
 
 int64_t ReserveOf(int64_t descriptors) { return std::min(kReserve, descriptors / 4); }
-
-// Returns the address that a client on this machine reaches a socket at.
-sockaddr_storage Reachable(sockaddr_storage address) {
-  auto& four = reinterpret_cast<sockaddr_in&>(address);
-  auto& six = reinterpret_cast<sockaddr_in6&>(address);
-  if (address.ss_family == AF_INET && four.sin_addr.s_addr == htonl(INADDR_ANY)) {
-    four.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  } else if (address.ss_family == AF_INET6 && IN6_IS_ADDR_UNSPECIFIED(&six.sin6_addr)) {
-    six.sin6_addr = in6addr_loopback;
-  }
-  return address;
-}
 
 // Returns an address and its port as text, which no two connections to a socket share.
 std::string TextOf(const sockaddr_storage& address) {
@@ -154,12 +143,16 @@ bool Listener::Dial(std::chrono::milliseconds timeout, bool http2) {
   const auto deadline = std::chrono::steady_clock::now() + timeout;
   const std::vector<sockaddr_storage> addresses = sockets_.Addresses();
   return std::all_of(addresses.begin(), addresses.end(), [&](const sockaddr_storage& listening) {
-    return DialOne(Reachable(listening), deadline, http2);
+    for (const sockaddr_storage& address : AddressesToDial(listening)) {
+      const std::optional<bool> answers = DialOne(address, deadline, http2);
+      if (answers) return *answers;
+    }
+    return true;  // a connection that could not be tried says nothing
   });
 }
 
-bool Listener::DialOne(const sockaddr_storage& address,
-                       std::chrono::steady_clock::time_point deadline, bool http2) {
+std::optional<bool> Listener::DialOne(const sockaddr_storage& address,
+                                      std::chrono::steady_clock::time_point deadline, bool http2) {
   const Descriptor client(
       ::socket(address.ss_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
   // Where it comes from is chosen first, so that the connection is known when it arrives: the same
@@ -170,6 +163,7 @@ bool Listener::DialOne(const sockaddr_storage& address,
   if (client.number() < 0 ||
       bind(client.number(), reinterpret_cast<sockaddr*>(&from), SizeOf(from)) != 0 ||
       getsockname(client.number(), reinterpret_cast<sockaddr*>(&from), &size) != 0) {
+    if (errno == EADDRNOTAVAIL || errno == EAFNOSUPPORT) return std::nullopt;
     return false;
   }
   const std::string place = TextOf(from);

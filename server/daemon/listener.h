@@ -16,6 +16,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <set>
 #include <string>
 #include <thread>
@@ -65,7 +66,8 @@ class Listener {
 
   // Connects to every socket that it listens on, as a client does, and returns whether each
   // connection was accepted within `timeout`. If `http2`, the server must also answer a call of its
-  // health service there. The limits do not concern these connections.
+  // health service there. The limits do not concern these connections. A socket at an address that
+  // this machine does not have any more is not tried.
   bool Dial(std::chrono::milliseconds timeout, bool http2);
 
   // Returns the number of connections that are open, and how many were refused.
@@ -80,8 +82,9 @@ class Listener {
   // Hands a connection to gRPC.
   void Pass(int connection);
   void Refuse(int connection, const std::string& peer, const char* why);
-  bool DialOne(const sockaddr_storage& address, std::chrono::steady_clock::time_point deadline,
-               bool http2);
+  // Dials one address; nothing if this machine does not have it.
+  std::optional<bool> DialOne(const sockaddr_storage& address,
+                              std::chrono::steady_clock::time_point deadline, bool http2);
 
   const Options options_;
   ListeningSockets sockets_;

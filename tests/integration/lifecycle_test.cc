@@ -13,31 +13,36 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
+// Makes a call as bytes, to a service whose messages are not compiled in here.
+std::string CallRaw(const std::shared_ptr<grpc::Channel>& channel, const std::string& method,
+                    const std::string& request) {
+  grpc::GenericStub stub(channel);
+  grpc::ClientContext context;
+  grpc::CompletionQueue queue;
+  const grpc::Slice slice(request);
+  const grpc::ByteBuffer bytes(&slice, 1);
+  auto call = stub.PrepareUnaryCall(&context, method, bytes, &queue);
+  call->StartCall();
+  grpc::ByteBuffer response;
+  grpc::Status status;
+  call->Finish(&response, &status, &queue);
+  void* tag = nullptr;
+  bool ok = false;
+  queue.Next(&tag, &ok);
+  EXPECT_TRUE(status.ok()) << status.error_message();
+  std::vector<grpc::Slice> slices;
+  response.Dump(&slices);
+  std::string answer;
+  for (const auto& part : slices) {
+    answer.append(reinterpret_cast<const char*>(part.begin()), part.size());
+  }
+  return answer;
+}
+
 class LifecycleTest : public DaemonTest {
  protected:
-  // Makes a call as bytes, to a service whose messages are not compiled in here.
   std::string CallRaw(const std::string& method, const std::string& request) {
-    grpc::GenericStub stub(channel_);
-    grpc::ClientContext context;
-    grpc::CompletionQueue queue;
-    const grpc::Slice slice(request);
-    const grpc::ByteBuffer bytes(&slice, 1);
-    auto call = stub.PrepareUnaryCall(&context, method, bytes, &queue);
-    call->StartCall();
-    grpc::ByteBuffer response;
-    grpc::Status status;
-    call->Finish(&response, &status, this);
-    void* tag = nullptr;
-    bool ok = false;
-    queue.Next(&tag, &ok);
-    EXPECT_TRUE(status.ok()) << status.error_message();
-    std::vector<grpc::Slice> slices;
-    response.Dump(&slices);
-    std::string answer;
-    for (const auto& part : slices) {
-      answer.append(reinterpret_cast<const char*>(part.begin()), part.size());
-    }
-    return answer;
+    return internal::CallRaw(channel_, method, request);
   }
 };
 
@@ -178,6 +183,20 @@ TEST_F(LifecycleTest, SaysInOneLineThatAPortIsInUse) {
 TEST(Daemon, ListensOnNamesAndIpv6) {
   DaemonProcess by_name({"--listen", "localhost:0"});
   EXPECT_THAT(by_name.ReadLine(), testing::MatchesRegex("listening on localhost:[1-9][0-9]*"));
+  for (const char* listen : {"[::1]:0", "[::]:0"}) {
+    DaemonProcess daemon({"--listen", listen, "--insecure"});
+    const std::string address = daemon.ReadAddress();
+    if (address.empty()) GTEST_SKIP() << "this machine has no IPv6: " << daemon.Errors();
+    const auto health = [&](const std::string& channel_address) {
+      return CallRaw(grpc::CreateChannel(channel_address, grpc::InsecureChannelCredentials()),
+                     "/grpc.health.v1.Health/Check", "");
+    };
+    const std::string port = address.substr(address.rfind(':'));
+    EXPECT_EQ(health("[::1]" + port), "\x08\x01") << listen;
+    if (std::string(listen) == "[::]:0") {
+      EXPECT_EQ(health("127.0.0.1" + port), "\x08\x01");
+    }
+  }
 }
 
 TEST(Daemon, RefusesBadUsageInOneLine) {

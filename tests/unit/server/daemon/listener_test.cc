@@ -9,6 +9,11 @@
 
 #include <cstring>
 #include <memory>
+#include <string>
+#include <vector>
+
+#include "server/daemon/health_dial.h"
+#include "server/net/socket_address.h"
 
 namespace polyest::internal {
 namespace {
@@ -58,6 +63,26 @@ TEST(RaiseDescriptorLimit, GoesAsFarAsTheHardLimit) {
   ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &limit), 0);
 }
 
+TEST(AddressesToDial, ReachASocketOfAllAddressesAlsoWhereThereIsNoIpv6) {
+  const auto dialled = [](const char* text) {
+    sockaddr_storage address = Address(text);
+    SetPort(address, 7);
+    std::vector<std::string> places;
+    for (const sockaddr_storage& place : AddressesToDial(address)) {
+      const IpAddress ip = ToIpAddress(place);
+      EXPECT_EQ(ip.port, 7);
+      EXPECT_EQ(place.ss_family, address.ss_family);
+      places.push_back(ip.host);
+    }
+    return places;
+  };
+  using ::testing::ElementsAre;
+  EXPECT_THAT(dialled("0.0.0.0"), ElementsAre("127.0.0.1"));
+  EXPECT_THAT(dialled("192.0.2.7"), ElementsAre("192.0.2.7"));
+  EXPECT_THAT(dialled("2001:db8::7"), ElementsAre("2001:db8::7"));
+  EXPECT_THAT(dialled("::"), ElementsAre("::1", "127.0.0.1"));
+}
+
 class ListenerTest : public testing::Test {
  protected:
   void SetUp() override {
@@ -92,6 +117,25 @@ TEST_F(ListenerTest, NoticesThatNobodyAccepts) {
   listener_.Start();
   EXPECT_TRUE(listener_.Dial(kPatience, /*http2=*/false));
   EXPECT_TRUE(listener_.Dial(kPatience, /*http2=*/true));
+}
+
+// The second is the address at which the first is dialled where there is no ::1.
+TEST(Listener, DialsItselfAtSocketsOfIpv6) {
+  for (const char* host : {"[::]", "[::ffff:127.0.0.1]"}) {
+    ListenAddress address{host, 0};
+    Listener listener({.limits = {.total = 1, .per_peer = 1}, .descriptors = 1'000'000});
+    if (!listener.Listen(address).ok()) GTEST_SKIP() << "this machine has no IPv6";
+    grpc::EnableDefaultHealthCheckService(true);
+    grpc::ServerBuilder builder;
+    listener.Serve(builder, grpc::InsecureServerCredentials());
+    const auto server = builder.BuildAndStart();
+    ASSERT_NE(server, nullptr);
+    listener.Start();
+    EXPECT_TRUE(listener.Dial(kPatience, /*http2=*/false)) << host;
+    EXPECT_TRUE(listener.Dial(kPatience, /*http2=*/true)) << host;
+    listener.Stop();
+    server->Shutdown();
+  }
 }
 
 TEST_F(ListenerTest, NoticesThatNobodyAnswers) {
