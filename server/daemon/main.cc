@@ -7,12 +7,14 @@
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
+#include <memory>
 #include <optional>
 #include <thread>
 
 #include "server/daemon/command_line.h"
 #include "server/daemon/daemon.h"
 #include "server/daemon/service_manager.h"
+#include "server/daemon/start_interrupt.h"
 #include "server/telemetry/library_log.h"
 #include "server/telemetry/structured_log.h"
 
@@ -53,6 +55,18 @@ sigset_t BlockSignals() {
   return signals;
 }
 
+// Starts the daemon. SIGTERM and SIGINT end the process at once meanwhile: nobody is served yet,
+// and what is on disk stays whole. SIGHUP waits.
+absl::StatusOr<std::unique_ptr<polyest::internal::Daemon>> Start(
+    const polyest::internal::DaemonOptions& options) {
+  sigset_t ends;
+  sigemptyset(&ends);
+  sigaddset(&ends, SIGTERM);
+  sigaddset(&ends, SIGINT);
+  const polyest::internal::StartInterrupt interrupt(ends);
+  return polyest::internal::Daemon::Start(options);
+}
+
 // Prints on stdout, a line each, where the daemon listens, and tells the service manager that it
 // serves.
 void Announce(const polyest::internal::Daemon& daemon) {
@@ -88,7 +102,7 @@ int main(int argc, char** argv) {
   if (!command_line.daemon.token_file.empty()) unsetenv("GRPC_TRACE");
   StartLog(command_line);
 
-  auto daemon = polyest::internal::Daemon::Start(command_line.daemon);
+  auto daemon = Start(command_line.daemon);
   if (!daemon.ok()) {
     std::fprintf(stderr, "polyestd: %s\n", std::string(daemon.status().message()).c_str());
     return 1;

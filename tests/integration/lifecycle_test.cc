@@ -1,3 +1,4 @@
+#include <absl/strings/str_cat.h>
 #include <grpcpp/generic/generic_stub.h>
 #include <grpcpp/support/byte_buffer.h>
 #include <signal.h>
@@ -5,6 +6,8 @@
 
 #include <algorithm>
 
+#include "server/net/descriptor.h"
+#include "server/net/listening_sockets.h"
 #include "tests/integration/daemon_fixture.h"
 
 namespace polyest::internal {
@@ -170,6 +173,22 @@ TEST_F(SmallFilesTest, RefusesWhatItsFilesCannotHoldAsOnAFullDisk) {
 TEST_F(LifecycleTest, EndsOnAnInterruptToo) {
   daemon_.Signal(SIGINT);
   EXPECT_EQ(daemon_.Wait(), 0);
+}
+
+TEST(Daemon, EndsOnASignalWhileItStarts) {
+  // A database that takes a connection and never answers.
+  ListeningSockets database;
+  int port = 0;
+  ASSERT_TRUE(database.Listen("", "127.0.0.1", port).ok());
+  for (const int signal : {SIGTERM, SIGINT}) {
+    DaemonProcess daemon({"--listen", "127.0.0.1:0", "--journal",
+                          absl::StrCat("postgresql://u@127.0.0.1:", port, "/d")});
+    const Descriptor connection(database.Accept().descriptor);
+    ASSERT_GE(connection.number(), 0);
+    daemon.Signal(signal);
+    EXPECT_EQ(daemon.Wait(), -signal);
+    EXPECT_EQ(daemon.ReadLine(), "");
+  }
 }
 
 TEST_F(LifecycleTest, SaysInOneLineThatAPortIsInUse) {
