@@ -211,6 +211,15 @@ void WatchFlow::OnMoved() {
 void WatchFlow::Drain() {
   std::lock_guard lock(mutex_);
   if (passed_on_ != nullptr) return passed_on_->Drain();
+  if (session_ == nullptr) return EndForShutdown();
+  // The last estimates of the writers, which have ended before, may still be on their way.
+  session_->AfterAnnounced([flow = shared_from_this()] {
+    const std::lock_guard later(flow->mutex_);
+    flow->EndForShutdown();
+  });
+}
+
+void WatchFlow::EndForShutdown() {
   End(ShuttingDown());
   Advance();
 }

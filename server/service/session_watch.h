@@ -47,6 +47,7 @@ class WatchFlow final : public SessionObserver,
   // The following are called with the mutex held.
   absl::Status Attach(const Caller& caller, const v1::WatchSessionRequest& request);
   void End(const absl::Status& status);
+  void EndForShutdown();
   void Advance();
   void PredictIfDue();
 

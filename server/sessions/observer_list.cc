@@ -49,6 +49,10 @@ void ObserverList::Announce(SharedEstimate estimate) {
       .IgnoreError();
 }
 
+void ObserverList::AfterAnnounced(std::function<void()> then) {
+  strand_->Submit(std::move(then), Admission::kAlways).IgnoreError();
+}
+
 void ObserverList::PassOn() {
   std::vector<std::shared_ptr<SessionObserver>> due;
   SharedEstimate estimate;

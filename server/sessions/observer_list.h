@@ -5,6 +5,7 @@
 #include <absl/status/status.h>
 
 #include <cstddef>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -35,6 +36,8 @@ class ObserverList : public std::enable_shared_from_this<ObserverList> {
   // not wait for the observers, and neither does an estimate for a long computation. An estimate
   // replaces an older one that still waits.
   void Announce(SharedEstimate estimate);
+  // Calls `then` after all estimates announced before have been passed on.
+  void AfterAnnounced(std::function<void()> then);
   // Refuses new observers from here on. Returns the observers it had, for the caller to tell them
   // of the end.
   std::vector<std::shared_ptr<SessionObserver>> Close();

@@ -186,6 +186,8 @@ class Session : public std::enable_shared_from_this<Session> {
     observers_->Remove(observer);
     activity_.OnUsed();
   }
+  // Calls `then`, soon, after the observers have been given all estimates that are kept by now.
+  void AfterAnnounced(std::function<void()> then) { observers_->AfterAnnounced(std::move(then)); }
   bool observed() const { return observers_->size() > 0; }
   // Weighs what is in memory of the session. May be called on the strand, or before others know
   // the session.

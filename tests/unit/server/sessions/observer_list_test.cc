@@ -60,6 +60,15 @@ TEST_F(ObserverListTest, KeepsNobodyWaitingWhoAnnounces) {
   EXPECT_EQ(first_->estimates.front()->sequence(), 3);
 }
 
+TEST_F(ObserverListTest, TellsOfTheLastEstimateBeforeTheEnd) {
+  ASSERT_TRUE(list_->Add(first_).ok());
+  size_t told = 0;
+  list_->Announce(EstimateOf(1));
+  list_->AfterAnnounced([&] { told = first_->estimates.size(); });
+  Await();
+  EXPECT_EQ(told, 1u);
+}
+
 TEST_F(ObserverListTest, LetsAnObserverLeaveWhileItIsTold) {
   struct Leaving final : SessionObserver {
     explicit Leaving(ObserverList& watched) : list(watched) {}
