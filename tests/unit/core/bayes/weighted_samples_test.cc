@@ -118,8 +118,8 @@ double RadicalInverse(int number, int base) {
 // Draws at a stride that is a power of the base are all in one layer. As many random draws have the
 // mean of a uniform variable to √(1/12/count), and its standard deviation to √(1/60/count).
 TEST(EquallyWeighted, IsNotInStepWithALowDiscrepancySequence) {
-  constexpr int kDraws = 6 * 6 * 6 * 25;
-  const Vector weights = Vector::Constant(kDraws, 1.0 / kDraws);
+  constexpr int kLength = 6 * 6 * 6 * 25;
+  const Vector weights = Vector::Constant(kLength, 1.0 / kLength);
   for (const int base : {2, 3, 5}) {
     for (const int count : {100, 200, 216, 300, 400, 600, 675}) {
       Vector chosen(count);
