@@ -139,6 +139,7 @@ bool WebServer::Stop(std::chrono::steady_clock::time_point deadline,
     if (!ended_.wait_until(lock, give_up, [this] { return open_.empty(); })) return false;
   }
   Reap();
+  handler_ = nullptr;  // it may be gone from here on
   return true;
 }
 

@@ -42,7 +42,7 @@ class WebServer {
   int port() const { return port_; }
   // Sets the encryption of connections to come; null: none.
   void UseTls(std::shared_ptr<SSL_CTX> tls);
-  // Begins to serve. `handler` must outlive the server, or Stop.
+  // Begins to serve. `handler` must outlive the server, or a Stop that returns true.
   void Serve(const HttpHandler& handler);
   // Takes no more connections, stops the handler, closes connections that are idle, and waits for
   // the others until `deadline`; those still open then are closed, too. Returns whether their
@@ -79,7 +79,7 @@ class WebServer {
   Connections open_;
   Connections over_;  // whose threads have ended or are about to
   std::map<std::string, int> hosts_;
-  const HttpHandler* handler_ = nullptr;  // null until it serves
+  const HttpHandler* handler_ = nullptr;  // null while it does not serve
   std::thread accepting_;
 };
 
