@@ -77,6 +77,24 @@ class Bins {
   double width_ = 0;
 };
 
+// Returns the rows at `count` pointers, one in each stretch of 1/count of the weight, at the part
+// place(i) of the i-th stretch (0 … 1).
+template <typename Place>
+std::vector<Eigen::Index> RowsAt(const ConstVectorRef& weights, int count, Place place) {
+  POLYEST_CHECK(weights.size() > 0 && count >= 0);
+  std::vector<Eigen::Index> chosen;
+  chosen.reserve(static_cast<size_t>(count));
+  Eigen::Index source = 0;
+  double cumulative = weights[0];
+  const double all = weights.sum();
+  for (int i = 0; i < count; ++i) {
+    const double pointer = all * (i + place(i)) / count;
+    while (cumulative < pointer && source + 1 < weights.size()) cumulative += weights[++source];
+    chosen.push_back(source);
+  }
+  return chosen;
+}
+
 }  // namespace
 
 double WeightedMean(const ConstVectorRef& draws, const ConstVectorRef& weights) {
@@ -143,20 +161,15 @@ JointDensity WeightedJointDensity(const ConstVectorRef& first, const ConstVector
 }
 
 std::vector<Eigen::Index> EquallyWeighted(const ConstVectorRef& weights, int count) {
-  POLYEST_CHECK(weights.size() > 0 && count >= 0);
+  return RowsAt(weights, count, [](int) { return 0.5; });
+}
+
+std::vector<Eigen::Index> StratifiedDraws(const ConstVectorRef& weights, int count) {
   constexpr double kGolden = 0.6180339887498949;  // (√5 − 1)/2
-  std::vector<Eigen::Index> chosen;
-  chosen.reserve(static_cast<size_t>(count));
-  Eigen::Index source = 0;
-  double cumulative = weights[0];
-  const double all = weights.sum();
-  for (int i = 0; i < count; ++i) {
-    const double place = 0.5 + i * kGolden;  // in its stretch, without the whole part
-    const double pointer = all * (i + place - std::floor(place)) / count;
-    while (cumulative < pointer && source + 1 < weights.size()) cumulative += weights[++source];
-    chosen.push_back(source);
-  }
-  return chosen;
+  return RowsAt(weights, count, [](int i) {
+    const double place = 0.5 + i * kGolden;
+    return place - std::floor(place);
+  });
 }
 
 }  // namespace polyest::internal

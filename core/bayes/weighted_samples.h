@@ -34,10 +34,13 @@ DensityEstimate WeightedDensity(const ConstVectorRef& draws, const ConstVectorRe
 JointDensity WeightedJointDensity(const ConstVectorRef& first, const ConstVectorRef& second,
                                   const ConstVectorRef& weights, int bins);
 
-// Returns the rows of `count` equally weighted draws among the weighted ones, each about as often
-// as its weight says. The pointers are one in each stretch of 1/count of the weight, at places that
-// a golden-ratio sequence gives: evenly spaced ones would go in step with draws that are a
-// low-discrepancy sequence, and miss whole layers of them.
+// Returns the rows of `count` equally weighted draws among the weighted ones, by systematic
+// resampling with evenly spaced pointers: deterministic, and each draw as often as its weight says.
 std::vector<Eigen::Index> EquallyWeighted(const ConstVectorRef& weights, int count);
+
+// Returns as many by stratified resampling, with each pointer at another place in its stretch of
+// the weight, by a golden-ratio sequence. For few draws that stand for all: where these are a
+// low-discrepancy sequence, evenly spaced pointers go in step with it and miss whole layers.
+std::vector<Eigen::Index> StratifiedDraws(const ConstVectorRef& weights, int count);
 
 }  // namespace polyest::internal

@@ -208,7 +208,7 @@ std::vector<PredictedNoise> NoiseOf(const Assessed& assessed, const RecordSummar
 }
 
 Matrix EquallyWeightedThetas(const PosteriorDraws& draws, const Prior& prior, int count) {
-  const std::vector<Eigen::Index> chosen = EquallyWeighted(draws.weights, count);
+  const std::vector<Eigen::Index> chosen = StratifiedDraws(draws.weights, count);
   Matrix thetas(count, prior.dimension());
   for (int i = 0; i < prior.dimension(); ++i) {
     thetas.col(i) =

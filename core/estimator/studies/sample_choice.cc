@@ -27,13 +27,13 @@ SampleChoice ChooseSamples(const ConstVectorRef& weights, const Eigen::VectorXi&
   const double half_share = weights.sum() / group_count / 2;
   const auto is_light = [&](const Rows& rows) { return weights(rows).sum() < half_share; };
   if (draws.empty() || std::ranges::any_of(draws, is_light)) {
-    return {.draws = EquallyWeighted(weights, count), .groups = {}};
+    return {.draws = StratifiedDraws(weights, count), .groups = {}};
   }
   SampleChoice choice;
   for (int group = 0; group < group_count; ++group) {
     const Rows& rows = draws[static_cast<size_t>(group)];
     const int own = count / group_count + (group < count % group_count ? 1 : 0);
-    for (const Eigen::Index row : EquallyWeighted(weights(rows), own)) {
+    for (const Eigen::Index row : StratifiedDraws(weights(rows), own)) {
       choice.draws.push_back(rows[static_cast<size_t>(row)]);
       choice.groups.push_back(group);
     }

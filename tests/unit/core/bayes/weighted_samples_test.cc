@@ -104,6 +104,7 @@ TEST(WeightedJointDensity, OfIndependentDrawsIsTheProductOfTheMarginals) {
 TEST(EquallyWeighted, TakesEachDrawAsOftenAsItsWeightSays) {
   EXPECT_THAT(EquallyWeighted(kWeights, 10), ElementsAre(0, 1, 1, 1, 1, 2, 2, 3, 3, 3));
   EXPECT_TRUE(EquallyWeighted(kWeights, 0).empty());
+  EXPECT_EQ(StratifiedDraws(kWeights, 10), EquallyWeighted(kWeights, 10));
 }
 
 // The radical inverse of a number in a base: the points of Halton's sequence in one dimension.
@@ -117,14 +118,14 @@ double RadicalInverse(int number, int base) {
 
 // Draws at a stride that is a power of the base are all in one layer. As many random draws have the
 // mean of a uniform variable to √(1/12/count), and its standard deviation to √(1/60/count).
-TEST(EquallyWeighted, IsNotInStepWithALowDiscrepancySequence) {
+TEST(StratifiedDraws, AreNotInStepWithALowDiscrepancySequence) {
   constexpr int kLength = 6 * 6 * 6 * 25;
   const Vector weights = Vector::Constant(kLength, 1.0 / kLength);
   for (const int base : {2, 3, 5}) {
     for (const int count : {100, 200, 216, 300, 400, 600, 675}) {
       Vector chosen(count);
       int i = 0;
-      for (const Eigen::Index row : EquallyWeighted(weights, count)) {
+      for (const Eigen::Index row : StratifiedDraws(weights, count)) {
         chosen[i++] = RadicalInverse(static_cast<int>(row), base);
       }
       const double deviation = std::sqrt((chosen.array() - chosen.mean()).square().mean());
