@@ -10,6 +10,7 @@ namespace {
 
 constexpr double kJumpProbability = 0.1;  // of a move with γ = 1
 constexpr double kStepSpread = 0.5;       // standard deviation of log γ
+constexpr double kBothSigns = 0.5;        // probability of logarithms where there are both signs
 constexpr double kJitter = 1e-6;          // keeps the moves irreducible, in box widths
 
 }  // namespace
@@ -73,9 +74,8 @@ void DifferentialEvolution::Sweep(double beta, Eigen::Index first, Eigen::Index 
 }
 
 void DifferentialEvolution::MoveHalf(double beta, const Halves& halves, Particles& particles) {
-  // Half of the moves are in η, the others in equal parts in each of the coordinates.
   const auto kinds = static_cast<Eigen::Index>(straight_.size());
-  const Eigen::Index kind = kinds > 0 ? Draw(2 * kinds) : 0;
+  const Eigen::Index kind = DrawKind();
   if (kind < kinds) {
     ProposeIn(straight_[static_cast<size_t>(kind)], halves, particles.etas);
   } else {
@@ -90,6 +90,15 @@ void DifferentialEvolution::MoveHalf(double beta, const Halves& halves, Particle
       cost = proposal_costs_[i];
     }
   }
+}
+
+Eigen::Index DifferentialEvolution::DrawKind() {
+  const auto kinds = static_cast<Eigen::Index>(straight_.size());
+  if (kinds == 0) return 0;
+  const Eigen::Index draw = Draw(2 * kinds);
+  // Of 0 … 3, both 0 and 1 are then moves along sums.
+  const bool by_choice = kinds == 2 && straight_.back().by_choice_alone();
+  return by_choice ? std::max<Eigen::Index>(draw - 1, 0) : draw;
 }
 
 void DifferentialEvolution::Propose(const Halves& halves, const Matrix& etas) {
@@ -107,10 +116,12 @@ void DifferentialEvolution::Propose(const Halves& halves, const Matrix& etas) {
   }
 }
 
-void DifferentialEvolution::ProposeIn(const StraightCoordinates& coordinates, const Halves& halves,
+void DifferentialEvolution::ProposeIn(StraightCoordinates& coordinates, const Halves& halves,
                                       const Matrix& etas) {
-  coordinates.FromLocal(etas.middleRows(halves.first, halves.count), us_, &volumes_);
-  coordinates.FromLocal(etas.middleRows(halves.other, halves.other_count), other_us_, nullptr);
+  const auto others = etas.middleRows(halves.other, halves.other_count);
+  if (coordinates.has_choice()) coordinates.Choose(others, Uniform() < kBothSigns);
+  coordinates.FromLocal(etas.middleRows(halves.first, halves.count), us_, &signs_, &volumes_);
+  coordinates.FromLocal(others, other_us_, nullptr, nullptr);
   moved_us_.resize(halves.count, etas.cols());
   for (Eigen::Index i = 0; i < halves.count; ++i) {
     const double gamma = Factor(etas.cols());
@@ -118,7 +129,7 @@ void DifferentialEvolution::ProposeIn(const StraightCoordinates& coordinates, co
     const Eigen::Index k = Draw(halves.other_count);
     moved_us_.row(i) = us_.row(i) + gamma * (other_us_.row(j) - other_us_.row(k));
   }
-  coordinates.ToLocal(moved_us_, proposal_, moved_volumes_);
+  coordinates.ToLocal(moved_us_, signs_, proposal_, moved_volumes_);
   volume_changes_ = moved_volumes_ - volumes_;
 }
 

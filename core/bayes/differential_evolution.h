@@ -51,10 +51,14 @@ class DifferentialEvolution {
     Eigen::Index first, count, other, other_count;
   };
   void MoveHalf(double beta, const Halves& halves, Particles& particles);
+  // Returns which of `straight_` a half moves in, or more: in η. Half of the moves are in η, the
+  // others in equal parts in each of the coordinates; but those of products that are curved by
+  // choice alone take their share from the moves in η, not from those along sums.
+  Eigen::Index DrawKind();
   // Write the points to which the half might move into `proposal_`. The second one does so by way
   // of u and writes the changes of log |dη/du| into `volume_changes_`.
   void Propose(const Halves& halves, const Matrix& etas);
-  void ProposeIn(const StraightCoordinates& coordinates, const Halves& halves, const Matrix& etas);
+  void ProposeIn(StraightCoordinates& coordinates, const Halves& halves, const Matrix& etas);
   double Factor(Eigen::Index dimension);  // γ
 
   const Cost& cost_;
@@ -67,7 +71,7 @@ class DifferentialEvolution {
   std::vector<StraightCoordinates> straight_;  // those that are curved in η
   Matrix proposal_;
   Vector proposal_costs_;
-  Matrix us_, moved_us_, other_us_;
+  Matrix us_, signs_, moved_us_, other_us_;
   Vector volumes_, moved_volumes_, volume_changes_;
 };
 

@@ -1,5 +1,6 @@
 #include "core/bayes/straight_coordinates.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace polyest::internal {
@@ -28,38 +29,76 @@ StraightCoordinates::StraightCoordinates(const Prior& prior, const Region& regio
         map == ParameterMap::kAffine) {
       continue;
     }
-    const bool positive = parameter.ToParameter(germ.Lower()) > 0;
-    const bool negative = parameter.ToParameter(germ.Upper()) < 0;
-    if (map == ParameterMap::kExponential && !positive && !negative) continue;
+    const bool one_sign =
+        parameter.ToParameter(germ.Lower()) > 0 || parameter.ToParameter(germ.Upper()) < 0;
+    const bool of_choice = map == ParameterMap::kExponential && !one_sign;
     curved_.push_back(
-        {i, negative ? -1.0 : 1.0, used == germ, parameter.location, parameter.scale});
+        {i, of_choice, !of_choice, used == germ, parameter.location, parameter.scale});
   }
 }
 
-void StraightCoordinates::FromLocal(const ConstMatrixRef& etas, Matrix& us,
-                                    Vector* log_volumes) const {
-  us = region_.ManyToGerm(etas);
-  if (prior_.correlated()) us = (us * prior_.factor().transpose()).eval();
-  if (log_volumes != nullptr) log_volumes->setZero(us.rows());
-  for (const Curved& curved : curved_) ToStraight(curved, us.col(curved.parameter), log_volumes);
+bool StraightCoordinates::has_choice() const {
+  return std::any_of(curved_.begin(), curved_.end(),
+                     [](const Curved& curved) { return curved.of_choice; });
 }
 
-void StraightCoordinates::ToLocal(const ConstMatrixRef& us, Matrix& etas,
+bool StraightCoordinates::by_choice_alone() const {
+  return std::all_of(curved_.begin(), curved_.end(),
+                     [](const Curved& curved) { return curved.of_choice; });
+}
+
+void StraightCoordinates::Choose(const ConstMatrixRef& etas, bool of_both_signs) {
+  const Matrix scores = Scores(etas);
+  for (Curved& curved : curved_) {
+    if (!curved.of_choice) continue;
+    // θ rises with z.
+    const auto column = scores.col(curved.parameter);
+    curved.used = of_both_signs || prior_.OfScore(curved.parameter, column.minCoeff()) > 0 ||
+                  prior_.OfScore(curved.parameter, column.maxCoeff()) < 0;
+  }
+}
+
+Matrix StraightCoordinates::Scores(const ConstMatrixRef& etas) const {
+  Matrix scores = region_.ManyToGerm(etas);
+  if (prior_.correlated()) scores = (scores * prior_.factor().transpose()).eval();
+  return scores;
+}
+
+void StraightCoordinates::FromLocal(const ConstMatrixRef& etas, Matrix& us, Matrix* signs,
+                                    Vector* log_volumes) const {
+  us = Scores(etas);
+  Vector unused(us.rows());
+  if (signs != nullptr) signs->setOnes(us.rows(), us.cols());
+  if (log_volumes != nullptr) log_volumes->setZero(us.rows());
+  for (const Curved& curved : curved_) {
+    if (!curved.used) continue;
+    const int i = curved.parameter;
+    ToStraight(curved, us.col(i), signs != nullptr ? VectorRef(signs->col(i)) : VectorRef(unused),
+               log_volumes);
+  }
+}
+
+void StraightCoordinates::ToLocal(const ConstMatrixRef& us, const Matrix& signs, Matrix& etas,
                                   Vector& log_volumes) const {
   Matrix xis = us;
   log_volumes.setZero(us.rows());
-  for (const Curved& curved : curved_) FromStraight(curved, xis.col(curved.parameter), log_volumes);
+  for (const Curved& curved : curved_) {
+    if (!curved.used) continue;
+    FromStraight(curved, xis.col(curved.parameter), signs.col(curved.parameter), log_volumes);
+  }
   if (prior_.correlated()) xis = SolveLower(prior_.factor(), Matrix(xis.transpose())).transpose();
   etas = region_.ManyToLocal(xis);
 }
 
 // With u = log |θ| and θ = l + s z, log |dz/du| is u; with u = θ = e^{l + s z}, it is −s z; both up
 // to a constant.
-void StraightCoordinates::ToStraight(const Curved& curved, VectorRef column,
+void StraightCoordinates::ToStraight(const Curved& curved, VectorRef column, VectorRef signs,
                                      Vector* log_volumes) const {
   auto values = column.array();
   if (curved.of_own_germ && map_ == ParameterMap::kExponential) {
-    values = (curved.sign * (curved.location + curved.scale * values)).log();
+    values = curved.location + curved.scale * values;
+    signs = values.sign().matrix();
+    values = values.abs().log();
     if (log_volumes != nullptr) *log_volumes += column;
   } else if (curved.of_own_germ) {
     if (log_volumes != nullptr) *log_volumes -= curved.scale * column;
@@ -68,26 +107,27 @@ void StraightCoordinates::ToStraight(const Curved& curved, VectorRef column,
     for (Eigen::Index row = 0; row < column.size(); ++row) {
       const double z = column[row];
       const double theta = prior_.OfScore(curved.parameter, z);
-      const double u = map_ == ParameterMap::kExponential ? std::log(curved.sign * theta) : theta;
+      const double u = map_ == ParameterMap::kExponential ? std::log(std::abs(theta)) : theta;
       if (log_volumes != nullptr) (*log_volumes)[row] += LogSlope(curved, z, u);
+      signs[row] = theta < 0 ? -1 : 1;
       column[row] = u;
     }
   }
 }
 
 void StraightCoordinates::FromStraight(const Curved& curved, VectorRef column,
-                                       Vector& log_volumes) const {
+                                       const ConstVectorRef& signs, Vector& log_volumes) const {
   auto values = column.array();
   if (curved.of_own_germ && map_ == ParameterMap::kExponential) {
     log_volumes += column;
-    values = (curved.sign * values.exp() - curved.location) / curved.scale;
+    values = (signs.array() * values.exp() - curved.location) / curved.scale;
   } else if (curved.of_own_germ) {
     values = (values.log() - curved.location) / curved.scale;
     log_volumes -= curved.scale * column;
   } else {
     for (Eigen::Index row = 0; row < column.size(); ++row) {
       const double u = column[row];
-      const double theta = map_ == ParameterMap::kExponential ? curved.sign * std::exp(u) : u;
+      const double theta = map_ == ParameterMap::kExponential ? signs[row] * std::exp(u) : u;
       column[row] = prior_.ScoreOf(curved.parameter, theta);
       log_volumes[row] += LogSlope(curved, column[row], u);
     }
