@@ -39,7 +39,7 @@ struct PredictedNoise {
 std::vector<PredictedNoise> NoiseOf(const Assessed& assessed, const RecordSummary& record,
                                     const LearnedNoise& learned, const ResolvedProblem& problem);
 
-// Returns `count` equally weighted draws of the uncertain parameters, count × n.
+// Returns `count` equally weighted draws of the uncertain parameters (StratifiedDraws), count × n.
 Matrix EquallyWeightedThetas(const PosteriorDraws& draws, const Prior& prior, int count);
 
 // The rows to predict, and the values to predict them with.

@@ -57,7 +57,7 @@ TEST(Mixture, IsDrawnFromByItsWeights) {
   const Posterior posterior = estimator->CurrentPosterior(options).value();
   const Estimate estimate = estimator->CurrentEstimate().value();
   EXPECT_GT(estimate.components[0].parameters[0].map, 0);
-  // Systematic resampling gives each piece its share to one draw.
+  // Stratified resampling gives each piece its share to a few draws.
   EXPECT_NEAR((posterior.samples.col(0).array() > 0).count(), 1000 * estimate.components[0].weight,
               5);
   EXPECT_NEAR(posterior.marginals[0].mean, estimate.parameters[0].mean, 0.01);
