@@ -40,7 +40,7 @@ void AddIdentifiability(const Findings& findings, const Estimate& estimate,
   }
   if (names.empty()) return;
   std::string message = absl::StrFormat(
-      "the data say less than the prior about %s; what is reported there is the prior's",
+      "the data say less than the prior about %s; what is reported there rests on the prior",
       absl::StrJoin(names, ", "));
   for (const TradeOff& trade_off : estimate.trade_offs) {
     absl::StrAppendFormat(

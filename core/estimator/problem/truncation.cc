@@ -8,6 +8,10 @@ namespace {
 constexpr int kFirstOrder = 3;
 constexpr int kLastOrder = 9;
 constexpr int64_t kAffordableTerms = 500;
+// Cubic polynomials seldom follow a model over a wide prior, whatever its dimension. The order
+// above them is therefore affordable with as many terms as it has in ten dimensions.
+constexpr int kFourthOrder = 4;
+constexpr int64_t kAffordableAtFourth = 1001;
 // An expansion whose order may still rise must begin well below the maximum.
 constexpr int64_t kAffordableAtFirst = 250;
 
@@ -30,7 +34,8 @@ std::optional<Truncation> NextTruncation(const ExpansionOptions& options, int di
   for (const int more : {2, 1}) {
     const Truncation next{present.order + more, present.exponent};
     if (next.order > kLastOrder) continue;
-    if (TermCount(dimension, next, kAffordableTerms) <= kAffordableTerms) return next;
+    const int64_t affordable = next.order <= kFourthOrder ? kAffordableAtFourth : kAffordableTerms;
+    if (TermCount(dimension, next, affordable) <= affordable) return next;
   }
   return std::nullopt;
 }
