@@ -164,7 +164,11 @@ RungeKuttaIntegrator::Result RungeKuttaIntegrator::Step(double stop_time_s) {
       step_s = remaining_s / 2;
     }
     const double next_s = stops ? stop_time_s : end_s_ + step_s;
-    if (!(next_s > end_s_)) return Result::kStandstill;
+    if (!(next_s > end_s_)) {
+      // Where no step has been tried, the rates tell the point that forbids any.
+      if (rejections == 0) scale_.Norm(stages_[0], scale_.weights());
+      return Result::kStandstill;
+    }
     const double norm = Try<Method>(step_s, next_s);
     order_.CountEvaluations(Method::kStages);
     const double factor = kSafety * std::pow(norm, -1.0 / Method::kOrder);

@@ -74,6 +74,24 @@ TEST_P(PointFailures, LeaveTheOthersAsAccurateAsWithoutThem) {
   }
 }
 
+// Points that differ in what does not move the model blow up together, and those before and after
+// them go on.
+TEST_P(PointFailures, TakeNoOtherPointWhereSeveralBlowUpAtOnce) {
+  Ensemble ensemble = SofteningSprings(20);
+  ensemble.specification.integration.method = GetParam();
+  for (const int point : {7, 11, 12, 18}) ensemble.Set("x0", point, 2.0);
+  const Matrix y = ensemble.Propagate(kTimes);
+  ASSERT_EQ(ensemble.failures.size(), 4u);
+  std::vector<int> points;
+  for (const PointFailure& failure : ensemble.failures) {
+    points.push_back(failure.point);
+    EXPECT_NEAR(failure.time_s, BlowUpTime(2.0), 1e-4);
+  }
+  EXPECT_THAT(points, ::testing::UnorderedElementsAre(7, 11, 12, 18));
+  EXPECT_TRUE(y.topRows(7).allFinite());
+  EXPECT_TRUE(y.row(19).allFinite());
+}
+
 TEST_P(PointFailures, MayTakeAllPoints) {
   Ensemble ensemble = SofteningSprings(10);
   ensemble.specification.integration.method = GetParam();
