@@ -12,7 +12,7 @@
 #include "server/digest/digest.h"
 #include "server/journal/history_check.h"
 #include "server/journal/seal_check.h"
-#include "server/journal/session_digest.h"
+#include "server/journal/session_row.h"
 #include "server/journal/sqlite_parts.h"
 #include "server/journal/sqlite_schema.h"
 
@@ -98,9 +98,7 @@ absl::Status CheckSessions(SqliteDatabase& database, JournalContents& contents) 
   POLYEST_ASSIGN_OR_RETURN(const std::vector<Seal> all, ReadBackupSeals(database));
   std::map<int64_t, Seal> seals;
   for (const Seal& seal : all) seals[seal.session] = seal;
-  SqliteQuery query(database,
-                    "SELECT number, tenant, name, hidden, created_s, created_ns, reorder_window_s, "
-                    "problem, digest FROM session ORDER BY number");
+  SqliteQuery query(database, "SELECT " POLYEST_ROW_COLUMNS " FROM session ORDER BY number");
   while (true) {
     POLYEST_ASSIGN_OR_RETURN(const bool more, query.Step());
     if (!more) break;

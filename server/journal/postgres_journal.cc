@@ -181,12 +181,7 @@ void PostgresJournal::SaveHistoryPoint(int64_t session, JournalHistoryPoint poin
 
 absl::StatusOr<v1::Problem> PostgresJournal::ReadProblem(int64_t session) const {
   POLYEST_ASSIGN_OR_RETURN(const SessionRow row, ReadRow(*pool_, session));
-  v1::Problem problem;
-  if (!row.damaged && problem.ParseFromString(row.problem)) return problem;
-  return absl::DataLossError(
-      absl::StrFormat("%s is damaged in the journal: its name, its window or its problem is not "
-                      "what was stored",
-                      row.head.name));
+  return ProblemIn(row);
 }
 
 absl::Status PostgresJournal::ReadBatches(

@@ -11,12 +11,11 @@ namespace {
 constexpr int64_t kHeadsOfPage = 500;
 
 // The columns of a head, and where they come from.
-#define POLYEST_HEADS                                                                             \
-  "SELECT number, tenant, name, created_s, created_ns, reorder_window_s, coalesce(sequence, 0), " \
-  "coalesce(place_samples, 0), coalesce(place_rows, 0), coalesce(place_run, 0), "                 \
-  "coalesce(place_time_s, 0), octet_length(problem) + coalesce(place_bytes, 0), "                 \
-  "coalesce((SELECT octet_length(state)::bigint FROM snapshot WHERE session = number), 0) FROM "  \
-  "session LEFT JOIN LATERAL (SELECT * FROM batch WHERE "                                         \
+#define POLYEST_HEADS                                                                            \
+  "SELECT " POLYEST_HEAD_COLUMNS ", " POLYEST_PLACE_COLUMNS                                      \
+  ", octet_length(problem) + coalesce(place_bytes, 0), "                                         \
+  "coalesce((SELECT octet_length(state)::bigint FROM snapshot WHERE session = number), 0) FROM " \
+  "session LEFT JOIN LATERAL (SELECT * FROM batch WHERE "                                        \
   "batch.session = session.number ORDER BY sequence DESC LIMIT 1) last ON true WHERE NOT hidden "
 
 constexpr char kHeads[] =
@@ -26,9 +25,7 @@ constexpr char kHeadsOfTenant[] =
 constexpr char kHeadOf[] = POLYEST_HEADS "AND tenant = $1 AND name = $2";
 #undef POLYEST_HEADS
 
-constexpr char kRow[] =
-    "SELECT number, tenant, name, hidden, created_s, created_ns, reorder_window_s, problem, digest "
-    "FROM session WHERE number = $1";
+constexpr char kRow[] = "SELECT " POLYEST_ROW_COLUMNS " FROM session WHERE number = $1";
 // One statement looks for the session and for its batches, because the session may be deleted and
 // its batches removed between two. A page has at most 8 MiB, or one batch. Before the last part of
 // a batch stand those that are kept apart (batch_parts.h).
@@ -42,20 +39,27 @@ constexpr char kPage[] =
     "$2 ORDER BY sequence LIMIT 256) batch) summed WHERE size <= 8388608 OR sequence = $2 + 1) "
     "page ON true WHERE number = $1 ORDER BY 1";
 
-SessionHead HeadIn(const PostgresResult& result, int row) {
-  SessionHead head;
-  head.number = result.Integer(row, 0);
-  head.tenant = result.Bytes(row, 1);
-  head.name = result.Bytes(row, 2);
-  head.create_time.set_seconds(result.Integer(row, 3));
-  head.create_time.set_nanos(static_cast<int32_t>(result.Integer(row, 4)));
-  head.reorder_window_s = result.Real(row, 5);
-  head.place.sequence = result.Integer(row, 6);
-  head.place.samples = result.Integer(row, 7);
-  head.place.rows = result.Integer(row, 8);
-  head.place.last_row = {static_cast<int>(result.Integer(row, 9)), result.Real(row, 10)};
-  head.bytes = result.Integer(row, 11);
-  head.snapshot_bytes = result.Integer(row, 12);
+// Is one row of a result.
+class PostgresRow {
+ public:
+  PostgresRow(const PostgresResult& result, int row) : result_(result), row_(row) {}
+
+  int64_t Integer(int column) const { return result_.Integer(row_, column); }
+  double Real(int column) const { return result_.Real(row_, column); }
+  bool Flag(int column) const { return result_.Flag(row_, column); }
+  std::string Bytes(int column) const { return result_.Bytes(row_, column); }
+
+ private:
+  const PostgresResult& result_;
+  const int row_;
+};
+
+SessionHead HeadIn(const PostgresResult& result, int number) {
+  const PostgresRow row(result, number);
+  SessionHead head = ReadSessionHead(row);
+  head.place = ReadSessionPlace(row, kHeadColumns);
+  head.bytes = row.Integer(kHeadColumns + kPlaceColumns);
+  head.snapshot_bytes = row.Integer(kHeadColumns + kPlaceColumns + 1);
   return head;
 }
 
@@ -98,17 +102,7 @@ absl::StatusOr<SessionRow> ReadRow(PostgresPool& pool, int64_t session) {
   POLYEST_ASSIGN_OR_RETURN(const PostgresResult found,
                            pool.Query(kRow, PostgresParameters().Add(session)));
   if (found.rows() == 0) return NoSuchSession();
-  SessionRow row;
-  row.head.number = found.Integer(0, 0);
-  row.head.tenant = found.Bytes(0, 1);
-  row.head.name = found.Bytes(0, 2);
-  row.hidden = found.Flag(0, 3);
-  row.head.create_time.set_seconds(found.Integer(0, 4));
-  row.head.create_time.set_nanos(static_cast<int32_t>(found.Integer(0, 5)));
-  row.head.reorder_window_s = found.Real(0, 6);
-  row.problem = found.Bytes(0, 7);
-  row.damaged = found.Bytes(0, 8) != SessionDigest(row.head, row.hidden, row.problem);
-  return row;
+  return ReadSessionRow(PostgresRow(found, 0));
 }
 
 absl::StatusOr<PostgresResult> ReadPage(PostgresPool& pool, int64_t session, int64_t after) {

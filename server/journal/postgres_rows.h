@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "server/journal/postgres_pool.h"
-#include "server/journal/session_digest.h"
 #include "server/journal/session_journal.h"
+#include "server/journal/session_row.h"
 
 namespace polyest::internal {
 

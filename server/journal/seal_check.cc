@@ -7,6 +7,7 @@
 
 #include "core/common/status.h"
 #include "server/journal/session_digest.h"
+#include "server/journal/session_row.h"
 
 namespace polyest::internal {
 namespace {
@@ -74,15 +75,15 @@ absl::StatusOr<std::vector<std::string>> CheckSeals(SqliteDatabase& database, Se
   }
   std::set<int64_t> there;
   SqliteQuery query(database,
-                    "SELECT number, tenant, name, hidden, created_s, created_ns, reorder_window_s, "
-                    "problem, digest, coalesce((SELECT max(sequence) FROM batch WHERE session = "
-                    "number), 0) FROM session");
+                    "SELECT " POLYEST_ROW_COLUMNS
+                    ", coalesce((SELECT max(sequence) FROM batch WHERE session = number), 0) FROM "
+                    "session");
   while (true) {
     POLYEST_ASSIGN_OR_RETURN(const bool more, query.Step());
     if (!more) break;
     const SessionRow row = ReadSessionRow(query);
     there.insert(row.head.number);
-    POLYEST_RETURN_IF_ERROR(CheckSession(database, row, query.Integer(9), seals, found));
+    POLYEST_RETURN_IF_ERROR(CheckSession(database, row, query.Integer(kRowColumns), seals, found));
   }
   POLYEST_ASSIGN_OR_RETURN(const std::set<int64_t> deleted, DeletedSessions(database));
   for (const Seal& seal : seals.All()) {

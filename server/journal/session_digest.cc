@@ -6,6 +6,7 @@
 
 #include "core/common/status.h"
 #include "server/digest/digest.h"
+#include "server/journal/session_row.h"
 
 namespace polyest::internal {
 namespace {
@@ -26,32 +27,10 @@ std::string SessionDigest(const SessionHead& head, bool hidden, std::string_view
   return Digest(text.append(head.tenant).append(head.name).append(problem));
 }
 
-SessionRow ReadSessionRow(const SqliteQuery& query) {
-  SessionRow row;
-  row.head.number = query.Integer(0);
-  row.head.tenant = query.Bytes(1);
-  row.head.name = query.Bytes(2);
-  row.hidden = query.Integer(3) != 0;
-  row.head.create_time.set_seconds(query.Integer(4));
-  row.head.create_time.set_nanos(static_cast<int32_t>(query.Integer(5)));
-  row.head.reorder_window_s = query.Real(6);
-  row.problem = query.Bytes(7);
-  row.damaged = query.Bytes(8) != SessionDigest(row.head, row.hidden, row.problem);
-  return row;
-}
-
 absl::Status WriteSessionDigest(SqliteDatabase& database, int64_t session) {
-  std::string digest;
-  {
-    SqliteQuery query(database,
-                      "SELECT number, tenant, name, hidden, created_s, created_ns, "
-                      "reorder_window_s, problem, digest FROM session WHERE number = ?");
-    query.Bind(session);
-    POLYEST_ASSIGN_OR_RETURN(const bool there, query.Step());
-    if (!there) return absl::OkStatus();
-    const SessionRow row = ReadSessionRow(query);
-    digest = SessionDigest(row.head, row.hidden, row.problem);
-  }
+  POLYEST_ASSIGN_OR_RETURN(const auto row, FindSessionRow(database, session));
+  if (!row) return absl::OkStatus();
+  const std::string digest = SessionDigest(row->head, row->hidden, row->problem);
   SqliteQuery update(database, "UPDATE session SET digest = ? WHERE number = ?");
   return update.BindBlob(digest).Bind(session).Run();
 }
@@ -75,9 +54,7 @@ absl::Status WriteAllSessionDigests(SqliteDatabase& database) {
 absl::Status DeleteHidden(SqliteDatabase& database) {
   std::vector<int64_t> hidden;
   {
-    SqliteQuery query(database,
-                      "SELECT number, tenant, name, hidden, created_s, created_ns, "
-                      "reorder_window_s, problem, digest FROM session WHERE hidden <> 0");
+    SqliteQuery query(database, "SELECT " POLYEST_ROW_COLUMNS " FROM session WHERE hidden <> 0");
     while (true) {
       POLYEST_ASSIGN_OR_RETURN(const bool more, query.Step());
       if (!more) break;

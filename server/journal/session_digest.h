@@ -16,18 +16,6 @@ namespace polyest::internal {
 // Returns the digest of a session's row. The place of the head is not part of it.
 std::string SessionDigest(const SessionHead& head, bool hidden, std::string_view problem);
 
-// Holds a session's row.
-struct SessionRow {
-  SessionHead head;  // without its place
-  bool hidden = false;
-  std::string problem;  // serialized
-  bool damaged = false;
-};
-
-// Reads a row from a query whose first columns are number, tenant, name, hidden, created_s,
-// created_ns, reorder_window_s, problem and digest.
-SessionRow ReadSessionRow(const SqliteQuery& query);
-
 // Writes the digest of a session's row as it is now; nothing if there is no such session.
 absl::Status WriteSessionDigest(SqliteDatabase& database, int64_t session);
 // Writes the digests of all sessions. For a file that has none yet.

@@ -98,6 +98,7 @@ class SqliteQuery {
   // Return a column of the present row.
   int64_t Integer(int column) const;
   double Real(int column) const;
+  bool Flag(int column) const { return Integer(column) != 0; }
   std::string Bytes(int column) const;
 
  private:

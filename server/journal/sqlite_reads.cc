@@ -7,7 +7,7 @@
 
 #include "core/common/status.h"
 #include "server/digest/digest.h"
-#include "server/journal/session_digest.h"
+#include "server/journal/session_row.h"
 #include "server/journal/sqlite_journal.h"
 #include "server/journal/sqlite_parts.h"
 
@@ -57,13 +57,10 @@ absl::StatusOr<std::vector<SessionHead>> SqliteJournal::Heads() const {
   POLYEST_ASSIGN_OR_RETURN(SqliteDatabase* const database, reader.database());
   SqliteQuery query(
       *database,
-      "SELECT number, tenant, name, hidden, created_s, created_ns, reorder_window_s, problem, "
-      "session.digest, coalesce(sequence, 0), coalesce(place_samples, 0), coalesce(place_rows, 0), "
-      "coalesce(place_run, 0), coalesce(place_time_s, 0), length(problem) + coalesce(place_bytes, "
-      "0), coalesce((SELECT length(state) FROM snapshot WHERE session = number), 0) FROM session "
-      "LEFT JOIN batch ON "
-      "batch.session = number AND sequence = (SELECT max(sequence) FROM batch WHERE session = "
-      "number) ORDER BY tenant, name");
+      "SELECT " POLYEST_ROW_COLUMNS ", " POLYEST_PLACE_COLUMNS
+      ", length(problem) + coalesce(place_bytes, 0), coalesce((SELECT length(state) FROM snapshot "
+      "WHERE session = number), 0) FROM session LEFT JOIN batch ON batch.session = number AND "
+      "sequence = (SELECT max(sequence) FROM batch WHERE session = number) ORDER BY tenant, name");
   std::vector<SessionHead> heads;
   while (true) {
     POLYEST_ASSIGN_OR_RETURN(const bool more, query.Step());
@@ -71,31 +68,18 @@ absl::StatusOr<std::vector<SessionHead>> SqliteJournal::Heads() const {
     SessionRow row = ReadSessionRow(query);
     if (row.hidden && !row.damaged) continue;
     SessionHead& head = heads.emplace_back(std::move(row.head));
-    head.place.sequence = query.Integer(9);
-    head.place.samples = query.Integer(10);
-    head.place.rows = query.Integer(11);
-    head.place.last_row = {static_cast<int>(query.Integer(12)), query.Real(13)};
-    head.bytes = query.Integer(14);
-    head.snapshot_bytes = query.Integer(15);
+    head.place = ReadSessionPlace(query, kRowColumns);
+    head.bytes = query.Integer(kRowColumns + kPlaceColumns);
+    head.snapshot_bytes = query.Integer(kRowColumns + kPlaceColumns + 1);
   }
 }
 
 absl::StatusOr<v1::Problem> SqliteJournal::ReadProblem(int64_t session) const {
   Reader reader(*this);
   POLYEST_ASSIGN_OR_RETURN(SqliteDatabase* const database, reader.database());
-  SqliteQuery query(*database,
-                    "SELECT number, tenant, name, hidden, created_s, created_ns, reorder_window_s, "
-                    "problem, digest FROM session WHERE number = ?");
-  query.Bind(session);
-  POLYEST_ASSIGN_OR_RETURN(const bool there, query.Step());
-  if (!there) return NoSuchSession();
-  const SessionRow row = ReadSessionRow(query);
-  v1::Problem problem;
-  if (!row.damaged && problem.ParseFromString(row.problem)) return problem;
-  return absl::DataLossError(
-      absl::StrFormat("%s is damaged in the journal: its name, its window or its problem is not "
-                      "what was stored",
-                      row.head.name));
+  POLYEST_ASSIGN_OR_RETURN(const auto row, FindSessionRow(*database, session));
+  if (!row) return NoSuchSession();
+  return ProblemIn(*row);
 }
 
 // Returns the number of the last batch of a session, 0 if it has none.
