@@ -92,10 +92,14 @@ void OpenCalls::Leave(const Ticket& ticket) {
 
 absl::Status OpenCalls::Ticket::HoldAnswer(int64_t bytes) {
   const std::lock_guard lock(calls_.mutex_);
+  if (bytes <= answer_bytes_) return absl::OkStatus();
   int64_t& unread = calls_.shares_[tenant_].answer_bytes;
-  if (bytes > kSmallAnswer && unread > 0 && bytes > kMaxUnreadBytes - unread) return Unread(unread);
+  const int64_t of_others = unread - answer_bytes_;
+  if (bytes > kSmallAnswer && of_others > 0 && bytes > kMaxUnreadBytes - of_others) {
+    return Unread(unread);
+  }
   answer_bytes_ = bytes;
-  unread += bytes;
+  unread = of_others + bytes;
   return absl::OkStatus();
 }
 

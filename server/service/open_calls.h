@@ -49,8 +49,9 @@ class OpenCalls {
     // Counts the bytes of an answer until the call leaves, which is when the client has read it.
     // RESOURCE_EXHAUSTED where the tenant's clients would leave more than kMaxUnreadBytes unread;
     // the answer must not be sent then. Never refuses the only answer, nor one of up to
-    // kSmallAnswer bytes, as those are of most calls that change something. Must be called at most
-    // once.
+    // kSmallAnswer bytes, as those are of most calls that change something. A call that changes
+    // something and has a large answer holds the most that this may have before its work, and the
+    // answer itself afterwards: the larger of both is counted, once.
     absl::Status HoldAnswer(int64_t bytes);
 
    private:

@@ -14,6 +14,9 @@
 namespace polyest::internal {
 namespace {
 
+// The most bytes of a session's message besides its problem: of its name, and of some 20 numbers.
+constexpr size_t kDescriptionBytes = 1 << 10;
+
 absl::StatusOr<v1::ListSessionsResponse> ListPage(SessionRegistry& sessions,
                                                   const std::string& tenant,
                                                   const v1::ListSessionsRequest& request) {
@@ -109,7 +112,13 @@ SessionService::Unary* SessionService::CreateSession(Context* call,
                                                      v1::Session* response) {
   // Where the daemon that was chosen does not take it, this one does.
   const auto placed = std::make_shared<bool>(false);
-  return ForCaller({call, "CreateSession", request, response, /*anywhere=*/true},
+  const size_t answer_bytes = request->session().problem().ByteSizeLong() + kDescriptionBytes;
+  return ForCaller({.context = call,
+                    .method = "CreateSession",
+                    .request = request,
+                    .answer = response,
+                    .anywhere = true,
+                    .answer_bytes = static_cast<int64_t>(answer_bytes)},
                    [=, this](const Caller& caller, const Stop& stop) -> absl::Status {
                      if (!std::exchange(*placed, true)) {
                        POLYEST_RETURN_IF_ERROR(CheckPlacedHere(*call));

@@ -38,6 +38,7 @@ void UnaryCall::Run(const std::shared_ptr<State>& state) {
     End(state, state->call_stop.Name(outcome));
   };
   absl::Status status = stop.Check();
+  if (status.ok()) status = state->reactor->ticket_->HoldAnswer(state->call.answer_bytes);
   if (status.ok()) status = Guarded([&] { return state->work(stop, state->stop, finish); });
   if (!status.ok()) finish(status);
 }

@@ -42,6 +42,10 @@ class UnaryCall final : public grpc::ServerUnaryReactor {
     // Whether this daemon can do the work itself if the one that it is passed on to does not
     // answer.
     bool anywhere = false;
+    // The most bytes that the answer may have if the work changes something: room for them is taken
+    // before the work, which must not be done and then refused its answer. 0: the work changes
+    // nothing, or its answer is small.
+    int64_t answer_bytes = 0;
   };
 
   // Starts a call of a tenant whose work is handed to `submit` and fills the answer. Work that is

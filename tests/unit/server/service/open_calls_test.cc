@@ -119,5 +119,19 @@ TEST(OpenCalls, RefuseAnAnswerOfACallThatCameBeforeTheOthersWereLeftUnread) {
   EXPECT_FALSE(tickets[1]->HoldAnswer(kMost / 2).ok());
 }
 
+TEST(OpenCalls, HoldTheLargerOfAnAnswersSizes) {
+  constexpr int64_t kMost = OpenCalls::kMaxUnreadBytes;
+  OpenCalls calls;
+  auto expected = *calls.Enter(Kind::kUnary, "t");
+  const auto other = *calls.Enter(Kind::kUnary, "t");
+  EXPECT_TRUE(expected->HoldAnswer(kMost / 2).ok());
+  EXPECT_TRUE(other->HoldAnswer(kMost / 2).ok());
+  EXPECT_TRUE(expected->HoldAnswer(kMost / 2 - 1).ok());
+  EXPECT_FALSE(expected->HoldAnswer(kMost / 2 + 1).ok());
+  EXPECT_FALSE(calls.Enter(Kind::kUnary, "t").ok());
+  expected = nullptr;
+  EXPECT_TRUE(calls.Enter(Kind::kUnary, "t").ok());
+}
+
 }  // namespace
 }  // namespace polyest::internal
