@@ -14,11 +14,22 @@ namespace {
 
 using Families = std::vector<prometheus::MetricFamily>;
 
+prometheus::ClientMetric& AddFamily(Families& families, const char* name, const char* help,
+                                    prometheus::MetricType type) {
+  prometheus::MetricFamily& family = families.emplace_back();
+  family.name = name;
+  family.help = help;
+  family.type = type;
+  return family.metric.emplace_back();
+}
+
 void Add(Families& families, const char* name, const char* help, double value) {
-  prometheus::MetricFamily family{name, help, prometheus::MetricType::Gauge, {}};
-  family.metric.resize(1);
-  family.metric.front().gauge.value = value;
-  families.push_back(std::move(family));
+  AddFamily(families, name, help, prometheus::MetricType::Gauge).gauge.value = value;
+}
+
+// Adds a number that only rises; by custom its name ends in "_total".
+void AddCounter(Families& families, const char* name, const char* help, double value) {
+  AddFamily(families, name, help, prometheus::MetricType::Counter).counter.value = value;
 }
 
 // Returns the size of a file in bytes; 0 when there is no such file.
@@ -45,9 +56,9 @@ std::vector<prometheus::MetricFamily> DaemonGauges::Collect() const {
       static_cast<double>(ResidentMemoryBytes()));
   Add(families, "polyest_connections", "Open connections of clients.",
       static_cast<double>(listener_.open()));
-  Add(families, "polyest_refused_connections",
-      "Connections refused since the start, because too many were open.",
-      static_cast<double>(listener_.refused()));
+  AddCounter(families, "polyest_refused_connections_total",
+             "Connections refused since the start, because too many were open.",
+             static_cast<double>(listener_.refused()));
   Add(families, "process_open_fds", "Descriptors that the process has open.",
       static_cast<double>(OpenDescriptors()));
   if (!data_dir_.empty()) CollectDisk(families);

@@ -1,7 +1,7 @@
 #pragma once
 
-// Tells Prometheus the present state of the daemon, which is looked up at each scrape and counted
-// nowhere.
+// Tells Prometheus the present state of the daemon, and how many connections its listener has
+// refused; both are looked up at each scrape.
 
 #include <prometheus/collectable.h>
 

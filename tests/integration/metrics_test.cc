@@ -88,6 +88,12 @@ TEST_F(MetricsTest, CountRefusalsByCode) {
   EXPECT_EQ(ValueOf("polyest_calls_total{code=\"NOT_FOUND\",method=\"DeleteSession\"}", text), 1);
 }
 
+TEST_F(MetricsTest, CountRefusedConnectionsWhichOnlyRise) {
+  const std::string text = Scrape(port_);
+  EXPECT_THAT(text, HasSubstr("# TYPE polyest_refused_connections_total counter"));
+  EXPECT_EQ(ValueOf("polyest_refused_connections_total", text), 0);
+}
+
 TEST_F(MetricsTest, HaveEveryNameThatTheAlertsUse) {
   std::ifstream in(POLYEST_SOURCE_DIR "/deploy/monitoring/alerts.yml");
   std::ostringstream alerts;
