@@ -188,6 +188,9 @@ class SessionJournal {
   virtual absl::Status ReadBatches(
       int64_t session, int64_t after,
       const std::function<absl::Status(const JournalBatch&)>& take) const = 0;
+  // Does the same for batches up to `last` only.
+  absl::Status ReadBatchesUpTo(int64_t session, int64_t after, int64_t last,
+                               const std::function<absl::Status(const JournalBatch&)>& take) const;
   // Returns the digest of a batch; NOT_FOUND when there is no such batch.
   virtual absl::StatusOr<std::string> ReadDigest(int64_t session, int64_t sequence) const = 0;
   // Returns the latest snapshot of a session, if one was saved. A session that does not exist may

@@ -1,13 +1,9 @@
 #include "server/service/session_rows.h"
 
-#include <optional>
-#include <utility>
-
 #include "core/common/status.h"
-#include "core/estimator/record/sample_checks.h"
 #include "proto/wire/convert/measurements.h"
+#include "server/sessions/batch_replay.h"
 #include "server/sessions/loaded_session.h"
-#include "server/sessions/row_reorder.h"
 
 namespace polyest::internal {
 namespace {
@@ -22,22 +18,13 @@ absl::StatusOr<int64_t> ReadRows(const Session& session, const ResolvedProblem& 
                                  v1::Measurements& measurements) {
   POLYEST_RETURN_IF_ERROR(
       session.CheckMemory(kCopies * session.place().rows * LoadedSession::RowBytes(problem)));
-  const Model& model = *problem.problem().model;
-  std::optional<RowReorder> reorder;
-  if (session.reorder_window_s() > 0) {
-    reorder.emplace(SampleChecks(problem).names(), session.reorder_window_s());
-  }
+  BatchReplay replay(problem, session.reorder_window_s(), cuts);
   int64_t sequence = 0;
   const auto append = [&](const JournalBatch& batch) -> absl::Status {
     POLYEST_RETURN_IF_ERROR(stop.Check());
     sequence = batch.sequence;
-    POLYEST_ASSIGN_OR_RETURN(Samples samples, ToSamples(batch.measurements, model));
-    if (reorder) {
-      POLYEST_ASSIGN_OR_RETURN(RowReorder::Step step, reorder->Next(samples));
-      samples = step.released;
-      reorder->Accept(std::move(step));
-    }
-    AppendRows(cuts.Keep(std::move(samples)), measurements);
+    POLYEST_ASSIGN_OR_RETURN(const Samples samples, replay.Next(batch.measurements));
+    AppendRows(samples, measurements);
     return absl::OkStatus();
   };
   POLYEST_RETURN_IF_ERROR(session.ReadBatches(0, append));

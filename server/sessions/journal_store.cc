@@ -6,7 +6,6 @@
 #include "core/common/check.h"
 #include "core/common/status.h"
 #include "core/estimator/record/row_block.h"
-#include "proto/wire/convert/measurements.h"
 
 namespace polyest::internal {
 
@@ -106,38 +105,22 @@ absl::StatusOr<JournalStore::Rows> JournalStore::ReadSegment(const Segment& segm
                                                              int64_t rows) const {
   RowBlock read;
   SampleChecks checks(problem_, segment.before);
-  std::optional<RowReorder> reorder;
-  if (reorder_window_s_ > 0) {
-    RowReorder::Resumption from{.first_batch = segment.read_from, .released = std::nullopt};
-    const RecordPosition& before = segment.before;
-    if (before.rows > 0) from.released = SampleRow{before.run, before.time_s};
-    reorder.emplace(checks.names(), reorder_window_s_, from);
-  }
-  const absl::Status enough = absl::OutOfRangeError("the segment has been read");
-  const auto append = [&](const JournalBatch& batch) -> absl::Status {
-    if (batch.sequence > segment.last_batch) return enough;
-    return ReadBatch(batch, reorder, checks, read);
-  };
-  const absl::Status status = journal_->ReadBatches(number_, segment.read_from - 1, append);
-  if (!status.ok() && status != enough) return status;
+  RowReorder::Resumption from{.first_batch = segment.read_from, .released = std::nullopt};
+  const RecordPosition& before = segment.before;
+  if (before.rows > 0) from.released = SampleRow{before.run, before.time_s};
+  BatchReplay replay(problem_, reorder_window_s_, cuts_, from);
+  POLYEST_RETURN_IF_ERROR(journal_->ReadBatchesUpTo(
+      number_, segment.read_from - 1, segment.last_batch,
+      [&](const JournalBatch& batch) { return ReadBatch(batch, replay, checks, read); }));
   if (static_cast<int64_t>(read.rows.size()) != rows) {
     return absl::DataLossError("rows of the session are missing in the journal");
   }
   return std::make_shared<const RowBlock>(std::move(read));
 }
 
-// Appends the rows that a batch gives the segment to `read`. They have passed all checks before.
-absl::Status JournalStore::ReadBatch(const JournalBatch& batch, std::optional<RowReorder>& reorder,
-                                     SampleChecks& checks, RowBlock& read) const {
-  POLYEST_ASSIGN_OR_RETURN(Samples samples,
-                           ToSamples(batch.measurements, *problem_.problem().model));
-  if (reorder) {
-    auto step = reorder->Next(samples);
-    if (!step.ok()) return absl::DataLossError(step.status().message());
-    samples = std::move(step->released);
-    reorder->Accept(*std::move(step));
-  }
-  samples = cuts_.Keep(std::move(samples));
+absl::Status JournalStore::ReadBatch(const JournalBatch& batch, BatchReplay& replay,
+                                     SampleChecks& checks, RowBlock& read) {
+  POLYEST_ASSIGN_OR_RETURN(const Samples samples, replay.Next(batch.measurements));
   if (RowReorder::IsNothing(samples)) return absl::OkStatus();
   const auto checked = checks.Check(samples);
   if (!checked.ok()) return absl::DataLossError(checked.status().message());

@@ -14,14 +14,13 @@
 #include <array>
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <vector>
 
 #include "core/estimator/problem/resolved_problem.h"
 #include "core/estimator/record/sample_checks.h"
 #include "polyest/samples.h"
 #include "server/journal/session_journal.h"
-#include "server/sessions/row_reorder.h"
+#include "server/sessions/batch_replay.h"
 #include "server/sessions/run_cuts.h"
 
 namespace polyest::internal {
@@ -78,8 +77,9 @@ class JournalStore final : public SampleStore {
   size_t SegmentWith(int64_t row) const;
   absl::StatusOr<Rows> RowsOf(size_t segment) const;
   absl::StatusOr<Rows> ReadSegment(const Segment& segment, int64_t rows) const;
-  absl::Status ReadBatch(const JournalBatch& batch, std::optional<RowReorder>& reorder,
-                         SampleChecks& checks, RowBlock& read) const;
+  // Appends the rows that a batch gives the segment to `read`. They have passed all checks before.
+  static absl::Status ReadBatch(const JournalBatch& batch, BatchReplay& replay,
+                                SampleChecks& checks, RowBlock& read);
   void Remember(size_t segment, Rows rows) const;
 
   const ResolvedProblem& problem_;

@@ -19,6 +19,8 @@ namespace {
 // A problem is held as it came, as the core's structs, and by the estimator's parts.
 constexpr int64_t kCopiesOfProblem = 4;
 
+constexpr int64_t kAllBatches = std::numeric_limits<int64_t>::max();
+
 // Returns the number of threads of a session's estimator. A model that runs in processes of its own
 // would keep as many of them as long as the session is loaded.
 int ThreadsFor(const ResolvedProblem& problem, int threads) {
@@ -104,12 +106,7 @@ absl::StatusOr<std::unique_ptr<LoadedSession>> LoadedSession::Load(const Session
   if (any_cut) {
     POLYEST_ASSIGN_OR_RETURN(loaded->computed_, loaded->Begin(std::move(cuts), stop));
   }
-  const auto append = [&](const JournalBatch& batch) -> absl::Status {
-    POLYEST_RETURN_IF_ERROR(stop.Check());
-    POLYEST_RETURN_IF_ERROR(loaded->intake_.Take(batch.measurements));
-    return loaded->Store(batch.sequence);
-  };
-  POLYEST_RETURN_IF_ERROR(journal.ReadBatches(head.number, 0, append));
+  POLYEST_RETURN_IF_ERROR(loaded->Replay(kAllBatches, loaded->intake_, loaded->computed_, stop));
   const SessionPlace reached = loaded->intake_.place();
   if (reached.sequence != place.sequence || reached.rows != place.rows) {
     return absl::DataLossError("the last batches of the session are missing in the journal");
@@ -127,18 +124,7 @@ absl::Status LoadedSession::BeginAnew(RunCuts cuts, const EstimatorSnapshot& sna
                                       const Stop& stop) {
   POLYEST_ASSIGN_OR_RETURN(Computed anew, Begin(std::move(cuts), stop));
   BatchIntake intake(intake_.problem(), reorder_window_s_);
-  const absl::Status enough = absl::OutOfRangeError("the batches have been read");
-  const auto give = [&](const JournalBatch& batch) -> absl::Status {
-    if (batch.sequence > computed_.sequence) return enough;
-    POLYEST_RETURN_IF_ERROR(stop.Check());
-    POLYEST_RETURN_IF_ERROR(intake.Take(batch.measurements));
-    POLYEST_RETURN_IF_ERROR(Give(*intake.Oldest(batch.sequence), anew));
-    intake.RemoveOldest();
-    anew.store->Release(batch.sequence);
-    return absl::OkStatus();
-  };
-  const absl::Status read = journal_->ReadBatches(number_, 0, give);
-  if (!read.ok() && read != enough) return read;
+  POLYEST_RETURN_IF_ERROR(Replay(computed_.sequence, intake, anew, stop));
   if (anew.sequence != computed_.sequence) {
     return absl::DataLossError("the last batches of the session are missing in the journal");
   }
@@ -149,6 +135,19 @@ absl::Status LoadedSession::BeginAnew(RunCuts cuts, const EstimatorSnapshot& sna
   in_doubt_ = false;
   latest_ = nullptr;
   return absl::OkStatus();
+}
+
+absl::Status LoadedSession::Replay(int64_t last, BatchIntake& intake, Computed& computed,
+                                   const Stop& stop) const {
+  const auto give = [&](const JournalBatch& batch) -> absl::Status {
+    POLYEST_RETURN_IF_ERROR(stop.Check());
+    POLYEST_RETURN_IF_ERROR(intake.Take(batch.measurements));
+    POLYEST_RETURN_IF_ERROR(Give(*intake.Oldest(batch.sequence), computed));
+    intake.RemoveOldest();
+    computed.store->Release(batch.sequence);
+    return absl::OkStatus();
+  };
+  return journal_->ReadBatchesUpTo(number_, 0, last, give);
 }
 
 int64_t LoadedSession::RowBytes(const ResolvedProblem& problem) {
@@ -208,7 +207,7 @@ absl::Status LoadedSession::EndFailedRun(const absl::Status& reason, const Stop&
 
 absl::Status LoadedSession::WithEstimator(const Work& work) {
   return AllOrDoubt([&]() -> absl::Status {
-    POLYEST_RETURN_IF_ERROR(GiveUpTo(std::numeric_limits<int64_t>::max()));
+    POLYEST_RETURN_IF_ERROR(GiveUpTo(kAllBatches));
     return work(*computed_.estimator, computed_.sequence);
   });
 }

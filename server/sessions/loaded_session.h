@@ -129,6 +129,10 @@ class LoadedSession {
   // that `cuts` leave out, and the state of a snapshot that is not empty, if it is usable. After an
   // error everything is as before.
   absl::Status BeginAnew(RunCuts cuts, const EstimatorSnapshot& snapshot, const Stop& stop);
+  // Gives an estimator without batches those that the journal keeps, up to batch `last`, through an
+  // intake without batches.
+  absl::Status Replay(int64_t last, BatchIntake& intake, Computed& computed,
+                      const Stop& stop) const;
   // Takes the journal's snapshot and the cuts before it; nothing if it has none that is readable.
   std::pair<RunCuts, EstimatorSnapshot> Snapshot() const;
   absl::Status GiveUpTo(int64_t sequence);
