@@ -68,7 +68,7 @@ v1::Session Session::Describe() const {
   session.set_last_run(place.last_row.run);
   const SessionActivity::Summary summary = activity_.Summarize();
   v1::Session::Activity& activity = *session.mutable_activity();
-  activity.set_loaded(summary.loaded);
+  activity.set_loaded(loaded());
   activity.set_has_writer(writer_.is_held());
   activity.set_watcher_count(static_cast<int32_t>(observers_->size()));
   activity.set_batch_count(place.sequence - head_.place.sequence);
@@ -210,17 +210,20 @@ absl::StatusOr<SharedEstimate> Session::LatestEstimate(const Stop& stop) {
     const Computing computing(*this, *loaded);
     POLYEST_ASSIGN_OR_RETURN(latest, loaded->CurrentEstimate(stop));
   }
-  if (latest == passed_on_) return latest;
-  passed_on_ = latest;
+  if (latest != published_) Publish(latest, Clock::now() - begin);
+  return latest;
+}
+
+void Session::Publish(const SharedEstimate& estimate, Clock::duration duration) {
+  published_ = estimate;
   // A history that cannot be read is no reason to withhold an estimate.
   if (LoadHistory().ok()) {
-    if (auto point = history_->Add(*latest)) {
+    if (auto point = history_->Add(*estimate)) {
       services_.journal.SaveHistoryPoint(number(), *std::move(point), history_->stride());
     }
   }
-  CountEstimate(*latest, Clock::now() - begin);
-  AnnounceWhenKept(latest);
-  return latest;
+  CountEstimate(*estimate, duration);
+  AnnounceWhenKept(estimate);
 }
 
 void Session::AnnounceWhenKept(const SharedEstimate& estimate) {

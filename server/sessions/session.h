@@ -99,7 +99,8 @@ class Session : public std::enable_shared_from_this<Session> {
   SessionPlace taken() const { return ledger_.taken(); }
   // Checks whether the tenant may hold about so many bytes of memory more.
   absl::Status CheckMemory(int64_t bytes) const;
-  bool loaded() const { return activity_.loaded(); }
+  // Returns whether the estimator is in memory.
+  bool loaded() const;
   // Returns the time since the session was last used; nothing while it is in use.
   std::optional<Clock::duration> IdleTime() const;
 
@@ -225,6 +226,9 @@ class Session : public std::enable_shared_from_this<Session> {
   void Drop();
   void UnloadIfIdle(Clock::duration at_least);
   absl::Status LoadHistory();
+  // Adds a new estimate, which took so long to compute, to the history, counts it, and passes it on
+  // to the observers once its batches are kept.
+  void Publish(const SharedEstimate& estimate, Clock::duration duration);
   void AnnounceWhenKept(const SharedEstimate& estimate);
   void CountEstimate(const v1::Estimate& estimate, Clock::duration duration);
 
@@ -234,7 +238,7 @@ class Session : public std::enable_shared_from_this<Session> {
   BatchLedger ledger_;
 
   // Used on the strand only.
-  SharedEstimate passed_on_;                // the last estimate given to the observers
+  SharedEstimate published_;                // the last estimate given to the observers
   std::optional<EstimateHistory> history_;  // none until an estimate is passed on
 
   std::stop_source closing_;

@@ -6,7 +6,6 @@ namespace polyest::internal {
 
 void SessionActivity::OnLoaded(int64_t sequence, double measured_s) {
   const std::lock_guard lock(mutex_);
-  loaded_ = true;
   processed_ = sequence;
   measured_before_s_ = measured_s;
   measured_s_ = computed_s_ = 0;
@@ -14,7 +13,7 @@ void SessionActivity::OnLoaded(int64_t sequence, double measured_s) {
 
 void SessionActivity::OnUnloaded() {
   const std::lock_guard lock(mutex_);
-  loaded_ = false;
+  processed_.reset();
   measured_s_ = computed_s_ = 0;
 }
 
@@ -47,11 +46,6 @@ void SessionActivity::OnUsed() {
   last_use_ = Clock::now();
 }
 
-bool SessionActivity::loaded() const {
-  const std::lock_guard lock(mutex_);
-  return loaded_;
-}
-
 bool SessionActivity::computing() const {
   const std::lock_guard lock(mutex_);
   return computing_;
@@ -65,11 +59,10 @@ SessionActivity::Clock::duration SessionActivity::idle() const {
 SessionActivity::Summary SessionActivity::Summarize() const {
   const std::lock_guard lock(mutex_);
   Summary summary;
-  summary.loaded = loaded_;
   summary.estimates = estimates_;
   summary.reexpansions = reexpansions_;
   summary.compute_s = compute_s_;
-  if (loaded_) summary.sequence = processed_;
+  summary.sequence = processed_;
   if (measured_s_ > 0) summary.real_time_factor = measured_s_ / computed_s_;
   return summary;
 }

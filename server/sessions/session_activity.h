@@ -29,17 +29,15 @@ class SessionActivity {
   // Notes that a user of the session has left, so that its idle time starts again.
   void OnUsed();
 
-  bool loaded() const;
   bool computing() const;
   // Returns the time since the session was last used or computed.
   Clock::duration idle() const;
 
   struct Summary {
-    bool loaded = false;
     int64_t estimates = 0;
     int64_t reexpansions = 0;         // that the latest estimate needed
     double compute_s = 0;             // computed in all
-    std::optional<int64_t> sequence;  // of the last batch processed; none while not loaded
+    std::optional<int64_t> sequence;  // of the last batch processed; none while not in memory
     // Seconds of measurements ÷ seconds computed for them, since the estimator is in memory; 0
     // before anything is computed.
     double real_time_factor = 0;
@@ -48,12 +46,11 @@ class SessionActivity {
 
  private:
   mutable std::mutex mutex_;
-  bool loaded_ = false;
   bool computing_ = false;
   int64_t estimates_ = 0;
   int64_t reexpansions_ = 0;
   double compute_s_ = 0;
-  int64_t processed_ = 0;  // number of the last batch processed
+  std::optional<int64_t> processed_;  // as of Summary::sequence
   // Seconds of measurements processed, and computed for them, since the estimator is in memory.
   double measured_s_ = 0;
   double computed_s_ = 0;

@@ -18,6 +18,11 @@ Session::InMemory Session::Present() const {
   return in_memory_;
 }
 
+bool Session::loaded() const {
+  const std::lock_guard lock(mutex_);
+  return in_memory_.loaded != nullptr;
+}
+
 bool Session::ReadyToTake() const {
   const SharedJournal* const shared = services_.journal.shared();
   const InMemory present = Present();
@@ -72,7 +77,7 @@ absl::StatusOr<std::shared_ptr<LoadedSession>> Session::Loaded(const Stop& stop)
                                                services_.Loading(check_memory), stop));
   loaded->Attach(services_.journal, number(), services_.SnapshotRoom(number(), tenant()));
   Log(spdlog::level::info, "session loaded", {{"session", name()}, {"tenant", tenant()}});
-  passed_on_ = nullptr;
+  published_ = nullptr;
   history_.reset();
   Replace({loaded, losses});
   Weigh();
@@ -118,7 +123,7 @@ void Session::Follow(const SessionPlace& place) {
 void Session::Drop() {
   Replace({nullptr, Present().losses});
   Weigh();
-  passed_on_ = nullptr;
+  published_ = nullptr;
   history_.reset();
 }
 

@@ -9,10 +9,8 @@ using std::chrono::seconds;
 
 TEST(SessionActivity, SaysHowFarTheEstimatorIsWhileItIsInMemory) {
   SessionActivity activity;
-  EXPECT_FALSE(activity.loaded());
   EXPECT_EQ(activity.Summarize().sequence, std::nullopt);
   activity.OnLoaded(3, 100);
-  EXPECT_TRUE(activity.loaded());
   EXPECT_EQ(activity.Summarize().sequence, 3);
   activity.OnComputed(seconds(1), 5, 102);
   EXPECT_EQ(activity.Summarize().sequence, 5);
