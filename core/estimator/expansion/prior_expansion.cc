@@ -78,7 +78,9 @@ absl::Status TimeGrid::Validate() const {
 }
 
 int64_t TimeGrid::count() const {
-  const double steps = std::floor(until_s / step_s * (1 + 1e-12));
+  const double ratio = until_s / step_s;
+  // The margin for rounding is never a step, however many there are.
+  const double steps = std::floor(ratio + std::min(1e-12 * ratio, 0.5));
   return steps < static_cast<double>(kMaxCounted) ? static_cast<int64_t>(steps) + 1 : kMaxCounted;
 }
 

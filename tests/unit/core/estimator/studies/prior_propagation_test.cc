@@ -142,6 +142,14 @@ TEST(PropagatePrior, RefusalNamesFieldValueAndRule) {
               HasSubstr("draws: 7 must be from 8 to 100000"));
   EXPECT_THAT(refusal([](auto& o) { o.step_s = 1e-300; }, absl::StatusCode::kResourceExhausted),
               HasSubstr("limit"));
+  // The times are 0, 1e-12 … 1 s.
+  EXPECT_THAT(refusal(
+                  [](auto& o) {
+                    o.until_s = 1;
+                    o.step_s = 1e-12;
+                  },
+                  absl::StatusCode::kResourceExhausted),
+              HasSubstr("until/step: 1000000000001 times of"));
 }
 
 Problem ProblemOf(EquationSpecification equations, UncertainParameter uncertain) {
