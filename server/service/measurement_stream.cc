@@ -48,7 +48,7 @@ void MeasurementFlow::OnRead(bool ok) {
     if (session_ == nullptr) {
       End(InvalidField("session", "the first message of a stream must name one"));
     }
-  } else if (!draining_ && !end_) {
+  } else if (!drained_ && !end_) {
     Accept(std::move(reading_into_));
   }
   if (!taking_ && HasBatch() && IsQuicklyTaken(inbox_.front())) {
@@ -103,10 +103,10 @@ absl::Status MeasurementFlow::Join(absl::StatusOr<std::shared_ptr<Session>> sess
 }
 
 bool MeasurementFlow::PassOn(const absl::Status& refusal) {
-  if (context_.nodes == nullptr || draining_ || refusal.ok()) return false;
+  if (context_.nodes == nullptr || drained_ || refusal.ok()) return false;
   std::optional<NodeForwarder::Passage> passage = context_.nodes->PassageFor(call_, refusal);
   if (!passage) return false;
-  finished_ = true;
+  stage_ = Stage::kFinished;
   // Nothing is being read, and the first message is the only one that has been.
   passed_on_ = MeasurementRelay::Start(*std::move(passage), PathOf("StreamMeasurements"), call_,
                                        reactor_, std::move(inbox_.front()));
@@ -118,7 +118,7 @@ bool MeasurementFlow::PassOn(const absl::Status& refusal) {
 void MeasurementFlow::OnWritten(bool ok) {
   std::lock_guard lock(mutex_);
   if (passed_on_ != nullptr) return passed_on_->OnWritten(ok);
-  writing_ = false;
+  writing_ = Writing::kDone;
   outbox_.pop_front();
   if (!ok) Break(absl::CancelledError("the client does not read any more"));
   Advance();
@@ -147,8 +147,7 @@ void MeasurementFlow::OnReplaced() {
 void MeasurementFlow::EndSoon(const absl::Status& reason) {
   std::lock_guard lock(mutex_);
   if (passed_on_ != nullptr) return passed_on_->Drain();
-  if (!draining_) drained_ = reason;
-  draining_ = true;
+  if (!drained_) drained_ = reason;
   if (session_ == nullptr) End(reason);
   Advance();
 }
@@ -168,22 +167,12 @@ void MeasurementFlow::Break(const absl::Status& status) {
   stop_source_.request_stop();
   End(status);
   // The first one belongs to gRPC while it is being written.
-  while (outbox_.size() > (writing_ ? 1 : 0)) outbox_.pop_back();
+  while (outbox_.size() > (writing_ == Writing::kUnderWay ? 1 : 0)) outbox_.pop_back();
 }
 
 void MeasurementFlow::Advance() {
-  if (finished_ || reactor_ == nullptr) return;
-  if (!writing_ && !outbox_.empty() && outbox_.front().sequence <= kept_) {
-    writing_ = true;
-    // The next response, if it is ready, goes into the same packet. The first one does not wait for
-    // it: gRPC would keep that back, with the call's metadata, until the connection has something
-    // else to send, and says that it is written only then.
-    grpc::WriteOptions options;
-    if (has_written_ && outbox_.size() > 1 && std::next(outbox_.begin())->sequence <= kept_)
-      options.set_buffer_hint();
-    has_written_ = true;
-    reactor_->StartWrite(&outbox_.front().response, options);
-  }
+  if (stage_ == Stage::kFinished || reactor_ == nullptr) return;
+  StartWriting();
   StartLoading();
   StartTaking();
   StartComputing();
@@ -194,13 +183,28 @@ void MeasurementFlow::Advance() {
   FinishIfIdle();
 }
 
-bool MeasurementFlow::HasRoom() const {
+void MeasurementFlow::StartWriting() {
+  const auto may_be_sent = [this](const Answered& answered) { return answered.sequence <= kept_; };
+  if (writing_ == Writing::kUnderWay || outbox_.empty() || !may_be_sent(outbox_.front())) return;
+  // The next response, if it is ready, goes into the same packet. The first one does not wait for
+  // it: gRPC would keep that back, with the call's metadata, until the connection has something
+  // else to send, and says that it is written only then.
+  grpc::WriteOptions options;
+  const bool first = writing_ == Writing::kNothingYet;
+  if (!first && outbox_.size() > 1 && may_be_sent(*std::next(outbox_.begin()))) {
+    options.set_buffer_hint();
+  }
+  writing_ = Writing::kUnderWay;
+  reactor_->StartWrite(&outbox_.front().response, options);
+}
+
+bool MeasurementFlow::QueuesHaveRoom() const {
   return outbox_.size() < kOutbox && uncomputed_.size() < kMaxUncomputed;
 }
 
 bool MeasurementFlow::MayRead() const {
-  return !half_closed_ && !draining_ && !end_ && stage_ != Stage::kFinding &&
-         inbox_.size() < kInbox && MayHoldMore() && HasRoom();
+  return !half_closed_ && !drained_ && !end_ && stage_ != Stage::kFinding &&
+         inbox_.size() < kInbox && MayHoldMore() && QueuesHaveRoom();
 }
 
 // A stream that holds nothing may always read a message, so that none waits for others.
@@ -210,7 +214,7 @@ bool MeasurementFlow::MayHoldMore() const {
 }
 
 bool MeasurementFlow::AllTaken() const {
-  return (half_closed_ || draining_) && stage_ == Stage::kReady && !taking_ && inbox_.empty();
+  return (half_closed_ || drained_) && stage_ == Stage::kReady && !taking_ && inbox_.empty();
 }
 
 void MeasurementFlow::StartLoading() {
@@ -226,7 +230,7 @@ void MeasurementFlow::StartLoading() {
 }
 
 bool MeasurementFlow::HasBatch() const {
-  return !end_ && stage_ == Stage::kReady && !inbox_.empty() && HasRoom();
+  return !end_ && stage_ == Stage::kReady && !inbox_.empty() && QueuesHaveRoom();
 }
 
 // Returns whether taking the batch takes no longer than handing it to another thread. A batch that
@@ -260,8 +264,8 @@ void MeasurementFlow::StartComputing() {
 void MeasurementFlow::FinishIfIdle() {
   const bool working =
       taking_ || computing_ || stage_ == Stage::kFinding || stage_ == Stage::kLoading;
-  if (!end_ || working || writing_ || !outbox_.empty()) return;
-  finished_ = true;
+  if (!end_ || working || writing_ == Writing::kUnderWay || !outbox_.empty()) return;
+  stage_ = Stage::kFinished;
   // The lease is released before the client hears of the end, because the client may come back at
   // once.
   if (session_ != nullptr) session_->ReleaseWriter(this);

@@ -87,7 +87,11 @@ class MeasurementFlow final : public SessionObserver,
     v1::StreamMeasurementsResponse response;
     int64_t sequence = 0;  // number of that batch
   };
-  enum class Stage { kNone, kFinding, kLoading, kReady };
+  // Says how far the stream is with its session: it has none yet, or could not have it; looks for
+  // it; brings it into memory; works with it; or has finished, because the call has ended or
+  // another daemon serves it.
+  enum class Stage { kNone, kFinding, kLoading, kReady, kFinished };
+  enum class Writing { kNothingYet, kUnderWay, kDone };  // of responses
 
   void EndSoon(const absl::Status& reason);
 
@@ -102,11 +106,12 @@ class MeasurementFlow final : public SessionObserver,
   void Break(const absl::Status& status);
   // Starts whatever can be started: a write, a read, work, or the end of the call.
   void Advance();
+  void StartWriting();
   void StartLoading();
   void StartTaking();
   void StartComputing();
   void FinishIfIdle();
-  bool HasRoom() const;
+  bool QueuesHaveRoom() const;
   bool MayRead() const;
   bool MayHoldMore() const;
   bool HasBatch() const;
@@ -155,17 +160,16 @@ class MeasurementFlow final : public SessionObserver,
   std::list<Answered> outbox_;  // the first one is being written or is the next
   int64_t kept_ = 0;
   Stage stage_ = Stage::kNone;
+  Writing writing_ = Writing::kNothingYet;
+  // A message is read, batches are taken and batches are computed each on a thread of its own, all
+  // at the same time.
   bool reading_ = false;
-  bool writing_ = false;
-  bool has_written_ = false;  // whether a write has begun
   bool taking_ = false;
   bool computing_ = false;
-  bool half_closed_ = false;
-  bool draining_ = false;
-  absl::Status drained_;  // why draining_ is set
-  bool finished_ = false;
-  bool left_uncomputed_ = false;
-  std::optional<absl::Status> end_;  // how the stream ends, once the outbox is empty
+  bool half_closed_ = false;             // whether the client sends no more
+  std::optional<absl::Status> drained_;  // why no more is read, if the daemon asks for the end
+  std::optional<absl::Status> end_;      // how the stream ends, once the outbox is empty
+  bool left_uncomputed_ = false;         // whether batches were not computed when it ended
 };
 
 class MeasurementStream final : public MeasurementReactor {

@@ -1,5 +1,5 @@
-// What a stream does where a thread may wait: it finds and loads its session, takes batches and
-// computes them.
+// Does the work of a stream (measurement_stream.h) that may wait: finds and loads its session,
+// takes batches and computes them.
 
 #include <absl/strings/str_format.h>
 
@@ -100,7 +100,7 @@ void MeasurementFlow::Compute() {
   std::unique_lock lock(mutex_);
   const std::vector<Uncomputed> turn = NextTurn();
   const bool last = uncomputed_.empty() && AllTaken();
-  const absl::Status at_end = half_closed_ ? absl::OkStatus() : drained_;
+  const absl::Status at_end = half_closed_ ? absl::OkStatus() : drained_.value_or(absl::OkStatus());
   lock.unlock();
   const absl::Status computed = stop_.Name(Guarded([&] { return ComputeTurn(turn, last); }));
   lock.lock();
