@@ -145,7 +145,7 @@ void WatchFlow::OnEstimate(const SharedEstimate& estimate) {
 
 void WatchFlow::PredictIfDue() {
   if (!wanted_ || predicting_ || Clock::now() < due_) return;
-  // When the executor is full, a later estimate tries again.
+  // If the executor is full, a later estimate tries again.
   predicting_ =
       session_->strand().Submit([flow = shared_from_this()] { flow->ComputePrediction(); }).ok();
 }
@@ -179,20 +179,14 @@ void WatchFlow::OnWritten(bool ok) {
   std::lock_guard lock(mutex_);
   if (passed_on_ != nullptr) return passed_on_->OnWritten(ok);
   writing_ = false;
-  if (!ok) {
-    End(absl::CancelledError("the client does not read any more"));
-    pending_ = nullptr;
-    prediction_.reset();
-  }
+  if (!ok) Break(absl::CancelledError("the client does not read any more"));
   Advance();
 }
 
 void WatchFlow::OnCancelled() {
   std::lock_guard lock(mutex_);
   if (passed_on_ != nullptr) return passed_on_->OnCancelled();
-  End(absl::CancelledError("the call was cancelled"));
-  pending_ = nullptr;
-  prediction_.reset();
+  Break(absl::CancelledError("the call was cancelled"));
   Advance();
 }
 
@@ -229,26 +223,31 @@ void WatchFlow::End(const absl::Status& status) {
   stop_source_.request_stop();
 }
 
+void WatchFlow::Break(const absl::Status& status) {
+  End(status);
+  pending_ = nullptr;
+  prediction_.reset();
+}
+
 void WatchFlow::Advance() {
   if (finished_ || reactor_ == nullptr || writing_) return;
-  if (pending_ != nullptr) {
-    written_.clear_prediction();
-    *written_.mutable_estimate() = *std::exchange(pending_, nullptr);
-    writing_ = true;
-    reactor_->StartWrite(&written_);
-    return;
-  }
-  if (prediction_) {
-    written_.clear_estimate();
-    *written_.mutable_prediction() = *std::exchange(prediction_, std::nullopt);
-    writing_ = true;
-    reactor_->StartWrite(&written_);
-    return;
-  }
+  if (pending_ != nullptr || prediction_) return WriteNext();
   if (!end_ || registering_ || predicting_) return;
   finished_ = true;
   if (session_ != nullptr) session_->Unobserve(this);
   reactor_->Finish(ToGrpc(*end_));
+}
+
+void WatchFlow::WriteNext() {
+  if (pending_ != nullptr) {
+    written_.clear_prediction();
+    *written_.mutable_estimate() = *std::exchange(pending_, nullptr);
+  } else {
+    written_.clear_estimate();
+    *written_.mutable_prediction() = *std::exchange(prediction_, std::nullopt);
+  }
+  writing_ = true;
+  reactor_->StartWrite(&written_);
 }
 
 void WatchFlow::OnDone() {

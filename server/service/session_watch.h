@@ -48,7 +48,11 @@ class WatchFlow final : public SessionObserver,
   absl::Status Attach(const Caller& caller, const v1::WatchSessionRequest& request);
   void End(const absl::Status& status);
   void EndForShutdown();
+  // Ends the watch when nothing can be sent any more.
+  void Break(const absl::Status& status);
   void Advance();
+  // Writes the estimate, or else the prediction, that waits.
+  void WriteNext();
   void PredictIfDue();
 
   // Computes a prediction; runs on the strand.
