@@ -17,36 +17,26 @@ namespace {
 // them while no other task needs them.
 int ThreadsOf(const ServiceContext& context) { return context.executor.threads_per_lane(); }
 
+// Lists the studies: each is a function of proto/wire/operations, of its request and of what it is
+// computed from, and a method of StudyService.
+#define POLYEST_FOR_EACH_STUDY(DO) \
+  DO(ComputeEstimate)              \
+  DO(ComputePropagation)           \
+  DO(ComputeCostGrid)              \
+  DO(ComputeSensitivity)           \
+  DO(ComputeExperimentDesign)      \
+  DO(ComputePosterior)             \
+  DO(ComputeCostProfiles)          \
+  DO(ComputeLogDensity)            \
+  DO(ComputeRegularizationSweep)   \
+  DO(Predict)
+
 // The overloads of Run give all studies one name. The arguments after the request select a study of
 // an experiment or of an estimator.
-auto Run(const v1::ComputeEstimateRequest& request, auto&&... of) {
-  return ComputeEstimate(request, of...);
-}
-auto Run(const v1::ComputePropagationRequest& request, auto&&... of) {
-  return ComputePropagation(request, of...);
-}
-auto Run(const v1::ComputeCostGridRequest& request, auto&&... of) {
-  return ComputeCostGrid(request, of...);
-}
-auto Run(const v1::ComputeSensitivityRequest& request, auto&&... of) {
-  return ComputeSensitivity(request, of...);
-}
-auto Run(const v1::ComputeExperimentDesignRequest& request, auto&&... of) {
-  return ComputeExperimentDesign(request, of...);
-}
-auto Run(const v1::ComputePosteriorRequest& request, auto&&... of) {
-  return ComputePosterior(request, of...);
-}
-auto Run(const v1::ComputeCostProfilesRequest& request, auto&&... of) {
-  return ComputeCostProfiles(request, of...);
-}
-auto Run(const v1::ComputeLogDensityRequest& request, auto&&... of) {
-  return ComputeLogDensity(request, of...);
-}
-auto Run(const v1::ComputeRegularizationSweepRequest& request, auto&&... of) {
-  return ComputeRegularizationSweep(request, of...);
-}
-auto Run(const v1::PredictRequest& request, auto&&... of) { return Predict(request, of...); }
+#define POLYEST_RUN(Study) \
+  auto Run(const v1::Study##Request& request, auto&&... of) { return Study(request, of...); }
+POLYEST_FOR_EACH_STUDY(POLYEST_RUN)
+#undef POLYEST_RUN
 
 // Selects the studies of the prior, which need nothing of a session but its problem.
 template <typename Request>
@@ -157,35 +147,12 @@ absl::StatusOr<Job> StudyJob(const ServiceContext& context, const Caller& caller
   }
 }
 
-template absl::StatusOr<Job> StudyJob(const ServiceContext&, const Caller&,
-                                      const v1::ComputeEstimateRequest*,
-                                      v1::ComputeEstimateResponse*);
-template absl::StatusOr<Job> StudyJob(const ServiceContext&, const Caller&,
-                                      const v1::ComputePropagationRequest*,
-                                      v1::ComputePropagationResponse*);
-template absl::StatusOr<Job> StudyJob(const ServiceContext&, const Caller&,
-                                      const v1::ComputeCostGridRequest*,
-                                      v1::ComputeCostGridResponse*);
-template absl::StatusOr<Job> StudyJob(const ServiceContext&, const Caller&,
-                                      const v1::ComputeSensitivityRequest*,
-                                      v1::ComputeSensitivityResponse*);
-template absl::StatusOr<Job> StudyJob(const ServiceContext&, const Caller&,
-                                      const v1::ComputeExperimentDesignRequest*,
-                                      v1::ComputeExperimentDesignResponse*);
-template absl::StatusOr<Job> StudyJob(const ServiceContext&, const Caller&,
-                                      const v1::ComputePosteriorRequest*,
-                                      v1::ComputePosteriorResponse*);
-template absl::StatusOr<Job> StudyJob(const ServiceContext&, const Caller&,
-                                      const v1::ComputeCostProfilesRequest*,
-                                      v1::ComputeCostProfilesResponse*);
-template absl::StatusOr<Job> StudyJob(const ServiceContext&, const Caller&,
-                                      const v1::ComputeLogDensityRequest*,
-                                      v1::ComputeLogDensityResponse*);
-template absl::StatusOr<Job> StudyJob(const ServiceContext&, const Caller&,
-                                      const v1::ComputeRegularizationSweepRequest*,
-                                      v1::ComputeRegularizationSweepResponse*);
-template absl::StatusOr<Job> StudyJob(const ServiceContext&, const Caller&,
-                                      const v1::PredictRequest*, v1::PredictResponse*);
+#define POLYEST_STUDY_JOB(Study)                                              \
+  template absl::StatusOr<Job> StudyJob(const ServiceContext&, const Caller&, \
+                                        const v1::Study##Request*, v1::Study##Response*);
+POLYEST_FOR_EACH_STUDY(POLYEST_STUDY_JOB)
+#undef POLYEST_STUDY_JOB
+#undef POLYEST_FOR_EACH_STUDY
 
 absl::StatusOr<Job> ComputationJob(const ServiceContext& context, const Caller& caller,
                                    const v1::StartComputationRequest* request,
