@@ -30,11 +30,14 @@ ServiceDescriptors Services() {
 std::string PathOf(Method method) {
   const std::string name(method.name());
   for (const google::protobuf::ServiceDescriptor* const service : Services()) {
-    if (service->FindMethodByName(name) != nullptr) {
-      return absl::StrCat("/", service->full_name(), "/", name);
-    }
+    const google::protobuf::MethodDescriptor* const found = service->FindMethodByName(name);
+    if (found != nullptr) return PathOf(*found);
   }
   return "";  // not reached, because the services have all methods of the table
+}
+
+std::string PathOf(const google::protobuf::MethodDescriptor& method) {
+  return absl::StrCat("/", method.service()->full_name(), "/", method.name());
 }
 
 bool CoversAllMethods(const ServiceDescriptors& services) {

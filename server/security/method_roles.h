@@ -88,6 +88,7 @@ ServiceDescriptors Services();
 
 // Returns the path by which gRPC calls a method: "/polyest.v1.SessionService/GetSession".
 std::string PathOf(Method method);
+std::string PathOf(const google::protobuf::MethodDescriptor& method);
 
 // Returns whether the table has one entry for every method of the services, and no others.
 bool CoversAllMethods(const ServiceDescriptors& services);

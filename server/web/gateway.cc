@@ -13,6 +13,7 @@
 #include "server/telemetry/request_id.h"
 #include "server/telemetry/structured_log.h"
 #include "server/web/call_metadata.h"
+#include "server/web/http_status.h"
 #include "server/web/transcode.h"
 #include "server/web/wake_up.h"
 #include "server/web/web_answers.h"
@@ -66,25 +67,7 @@ Gateway::Gateway(std::shared_ptr<grpc::Channel> channel, MethodTable methods, Ho
       watches_(channel_) {}
 
 HttpAnswer Gateway::Refusal(int status, std::string_view why) const {
-  const auto code = [&] {
-    switch (status) {
-      case 404:
-        return StatusCode::NOT_FOUND;
-      case 405:
-      case 501:
-        return StatusCode::UNIMPLEMENTED;
-      case 408:
-        return StatusCode::DEADLINE_EXCEEDED;
-      case 413:
-      case 429:
-        return StatusCode::RESOURCE_EXHAUSTED;
-      case 500:
-        return StatusCode::INTERNAL;
-      default:
-        return StatusCode::INVALID_ARGUMENT;
-    }
-  };
-  return Secured(ErrorAnswer(status, code(), why));
+  return Secured(ErrorAnswer(status, CodeOfRefusal(status), why));
 }
 
 std::optional<HttpAnswer> Gateway::AnswerHead(const HttpRequest& request) const {

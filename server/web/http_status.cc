@@ -38,4 +38,23 @@ int HttpStatus(grpc::StatusCode code) {
   return 500;
 }
 
+grpc::StatusCode CodeOfRefusal(int http_status) {
+  switch (http_status) {
+    case 404:
+      return grpc::StatusCode::NOT_FOUND;
+    case 405:
+    case 501:
+      return grpc::StatusCode::UNIMPLEMENTED;
+    case 408:
+      return grpc::StatusCode::DEADLINE_EXCEEDED;
+    case 413:
+    case 429:
+      return grpc::StatusCode::RESOURCE_EXHAUSTED;
+    case 500:
+      return grpc::StatusCode::INTERNAL;
+    default:
+      return grpc::StatusCode::INVALID_ARGUMENT;
+  }
+}
+
 }  // namespace polyest::internal

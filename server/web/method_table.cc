@@ -2,6 +2,8 @@
 
 #include <absl/strings/str_cat.h>
 
+#include "server/security/method_roles.h"
+
 namespace polyest::internal {
 
 MethodTable::MethodTable(const std::vector<const google::protobuf::ServiceDescriptor*>& services) {
@@ -11,9 +13,7 @@ MethodTable::MethodTable(const std::vector<const google::protobuf::ServiceDescri
         absl::StrCat("/", package.substr(package.rfind('.') + 1), "/", service->name(), "/");
     for (int i = 0; i < service->method_count(); ++i) {
       const google::protobuf::MethodDescriptor* const method = service->method(i);
-      methods_.emplace(
-          absl::StrCat(prefix, method->name()),
-          WebMethod{method, absl::StrCat("/", service->full_name(), "/", method->name())});
+      methods_.emplace(absl::StrCat(prefix, method->name()), WebMethod{method, PathOf(*method)});
     }
   }
 }

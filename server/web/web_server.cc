@@ -15,10 +15,13 @@
 namespace polyest::internal {
 namespace {
 
+// The answer is one literal, because it is sent while there may be no memory for another.
+#define POLYEST_FULL R"({"code":8,"message":"too many connections; try again later","details":[]})"
 constexpr std::string_view kFull =
     "HTTP/1.1 503 Service Unavailable\r\nContent-Type: application/json\r\nRetry-After: 1\r\n"
-    "Connection: close\r\nContent-Length: 73\r\n\r\n"
-    R"({"code":8,"message":"too many connections; try again later","details":[]})";
+    "Connection: close\r\nContent-Length: 73\r\n\r\n" POLYEST_FULL;
+static_assert(sizeof(POLYEST_FULL) - 1 == 73, "Content-Length");
+#undef POLYEST_FULL
 
 // Bytes that the kernel holds of what a client does not read: a slow one does not fall far behind.
 constexpr int kSendBuffer = 128 << 10;
