@@ -15,8 +15,8 @@ namespace {
 
 using Message = google::protobuf::MessageLite;
 
-// What a unary call needs until it ends. The answer comes as bytes: for gRPC, a call may succeed
-// without any.
+// Holds what a unary call needs until it ends. The answer comes as bytes: for gRPC, a call may
+// succeed without any.
 struct UnderWay {
   std::unique_ptr<grpc::ClientContext> context;
   grpc::TemplatedGenericStub<Message, grpc::ByteBuffer> stub;
@@ -49,7 +49,7 @@ std::optional<NodeForwarder::Passage> NodeForwarder::PassageFor(
   // The deadline and the cancellation of the call hold for this one, too.
   passage.context = grpc::ClientContext::FromCallbackServerContext(call);
   for (const auto& [key, value] : access_.PassOn(call)) passage.context->AddMetadata(key, value);
-  const std::string id = OnlyValue(call, kRequestIdKey);
+  const std::string id = OnlyValue(call, kRequestIdKey).value_or("");
   if (IsRequestId(id)) passage.context->AddMetadata(kRequestIdKey, id);
   passage.channel = channels_->To(reason->owner);
   passage.owner = reason->owner;

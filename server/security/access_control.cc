@@ -12,6 +12,7 @@
 #include "core/common/check.h"
 #include "core/common/status.h"
 #include "server/security/in_process_caller.h"
+#include "server/security/metadata.h"
 #include "server/security/peer.h"
 
 namespace polyest::internal {
@@ -68,12 +69,7 @@ std::shared_ptr<const TokenTable> AccessControl::tokens() const {
 }
 
 Identification AccessControl::IdentificationOf(const grpc::ServerContextBase& call) const {
-  Identification identification;
-  const auto& metadata = call.client_metadata();
-  if (metadata.count(kAuthorizationKey) == 1) {
-    const grpc::string_ref value = metadata.find(kAuthorizationKey)->second;
-    identification.authorization.emplace(value.data(), value.size());
-  }
+  Identification identification{.authorization = OnlyValue(call, kAuthorizationKey)};
   if (IsPassedOn(call)) {
     // The certificate of the connection is the other daemon's.
     const std::string name = CallerPassedOn(call).certificate_name;

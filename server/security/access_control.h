@@ -24,7 +24,7 @@ struct AccessOptions {
   std::string token_file{};          // empty: no tokens are asked for
   bool client_certificates = false;  // the transport lets in only clients that have one
   bool behind_edge = false;          // callers on loopback are an edge that says who calls (peer.h)
-  // What the daemons of a database share, by which they believe what they say of their callers
+  // The secret by which the daemons of a database believe what they say of their callers
   // (node_caller.h); none: nobody is believed.
   std::optional<NodeSecret> nodes{};
 };
@@ -62,7 +62,6 @@ class AccessControl {
 
   // Reads the tokens again; keeps the old ones if that fails.
   absl::Status Reload();
-  const std::string& token_file() const { return options_.token_file; }
 
  private:
   explicit AccessControl(AccessOptions options) : options_(std::move(options)) {}

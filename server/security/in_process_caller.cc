@@ -25,9 +25,9 @@ const Secret& ProcessSecret() {
 
 // Returns the value of a key that the HTTP port has set; empty for a call that is not its own.
 std::string BelievedValue(const grpc::ServerContextBase& call, const char* key) {
-  const std::string secret = OnlyValue(call, kSecretKey);
-  const bool own = !secret.empty() && SameDigest(DigestOf(secret), ProcessSecret().digest);
-  return own ? OnlyValue(call, key) : "";
+  const std::optional<std::string> secret = OnlyValue(call, kSecretKey);
+  const bool own = secret && SameDigest(DigestOf(*secret), ProcessSecret().digest);
+  return own ? OnlyValue(call, key).value_or("") : "";
 }
 
 }  // namespace

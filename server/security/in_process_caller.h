@@ -1,7 +1,7 @@
 #pragma once
 
-// What the HTTP port says about the clients for whom it calls the daemon's own gRPC server, as
-// metadata. A secret of this process goes with it, without which nobody is believed.
+// Tells the daemon's own gRPC server, as metadata, for which client the HTTP port calls it. A
+// secret of this process goes with it, without which nobody is believed.
 
 #include <grpcpp/server_context.h>
 

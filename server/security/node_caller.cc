@@ -47,12 +47,13 @@ bool ClaimsToBePassedOn(const grpc::ServerContextBase& call) {
 }
 
 bool IsPassedOnWith(const grpc::ServerContextBase& call, const NodeSecret& secret) {
-  const std::string claimed = OnlyValue(call, kNodeSecretKey);
-  return !claimed.empty() && secret.IsSame(claimed);
+  const std::optional<std::string> claimed = OnlyValue(call, kNodeSecretKey);
+  return claimed && secret.IsSame(*claimed);
 }
 
 NodeCaller CallerPassedOn(const grpc::ServerContextBase& call) {
-  return {OnlyValue(call, kNodePeerKey), OnlyValue(call, kNodeCertificateKey)};
+  return {OnlyValue(call, kNodePeerKey).value_or(""),
+          OnlyValue(call, kNodeCertificateKey).value_or("")};
 }
 
 }  // namespace polyest::internal

@@ -1,8 +1,8 @@
 #pragma once
 
-// What a daemon says about the caller whose call it passes on to another daemon of the same
-// database, as metadata. The token goes with the call as it came, so that the other daemon checks
-// it by itself; a secret that the daemons share lets it believe the rest.
+// Tells another daemon of the same database, as metadata, whose call this daemon passes on to it.
+// The token goes with the call as it came, so that the other daemon checks it by itself; a secret
+// that the daemons share lets it believe the rest.
 
 #include <absl/status/statusor.h>
 #include <grpcpp/server_context.h>

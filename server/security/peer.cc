@@ -2,7 +2,8 @@
 
 #include <absl/strings/escaping.h>
 #include <absl/strings/match.h>
-#include <absl/strings/string_view.h>
+
+#include "server/security/metadata.h"
 
 namespace polyest::internal {
 
@@ -12,11 +13,9 @@ bool IsLoopbackPeer(const std::string& peer) {
 }
 
 std::optional<std::string> EdgeHeader(const grpc::ServerContextBase& call, const char* key) {
-  const auto& metadata = call.client_metadata();
-  if (metadata.count(key) != 1) return std::nullopt;
-  const grpc::string_ref value = metadata.find(key)->second;
-  if (value.empty()) return std::nullopt;
-  return absl::CEscape(absl::string_view(value.data(), value.size()));
+  const std::optional<std::string> value = OnlyValue(call, key);
+  if (!value || value->empty()) return std::nullopt;
+  return absl::CEscape(*value);
 }
 
 }  // namespace polyest::internal

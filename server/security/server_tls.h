@@ -27,7 +27,6 @@ class ServerTls {
   // Reads the files again; keeps what it has if that fails. New connections use them within a
   // second or two; open connections go on.
   absl::Status Reload();
-  const TlsFiles& files() const { return files_; }
 
  private:
   // Holds a file in memory whose content is replaced all at once.
