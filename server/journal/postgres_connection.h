@@ -71,6 +71,21 @@ class PostgresResult {
   std::unique_ptr<pg_result, void (*)(pg_result*)> result_;
 };
 
+// Is one row of a result, which must outlive it.
+class PostgresRow {
+ public:
+  PostgresRow(const PostgresResult& result, int row) : result_(result), row_(row) {}
+
+  int64_t Integer(int column) const { return result_.Integer(row_, column); }
+  double Real(int column) const { return result_.Real(row_, column); }
+  bool Flag(int column) const { return result_.Flag(row_, column); }
+  std::string Bytes(int column) const { return result_.Bytes(row_, column); }
+
+ private:
+  const PostgresResult& result_;
+  const int row_;
+};
+
 struct PostgresStatement {
   const char* sql;  // must live as long as the connection
   PostgresParameters parameters{};

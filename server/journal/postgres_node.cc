@@ -12,12 +12,11 @@
 #include "proto/wire/refusal/refusal.h"
 #include "server/journal/postgres_nodes.h"
 #include "server/journal/postgres_status.h"
+#include "server/journal/session_row.h"
 
 namespace polyest::internal {
 namespace {
 
-// The statements below contain this length, too.
-constexpr std::chrono::seconds kLease{3};
 constexpr std::chrono::seconds kBeat{1};
 // Pause between two pieces of what deleted sessions have left.
 constexpr std::chrono::milliseconds kTidyPause{5};
@@ -33,16 +32,15 @@ constexpr char kOwnerOf[] =
     "SELECT owner.node, address, lease_until > clock_timestamp() FROM owner LEFT JOIN node ON "
     "node.node = owner.node WHERE session = $1";
 constexpr char kLastPlace[] =
-    "SELECT sequence, place_samples, place_rows, place_run, place_time_s FROM batch WHERE session "
-    "= $1 ORDER BY sequence DESC LIMIT 1";
-constexpr char kRenew[] =
-    "UPDATE node SET lease_until = clock_timestamp() + interval '3 s', address = $2, streams = $3, "
-    "busy_cores = $4 WHERE node = $1 AND lease_until > clock_timestamp() RETURNING draining";
+    "SELECT " POLYEST_PLACE_COLUMNS " FROM batch WHERE session = $1 ORDER BY sequence DESC LIMIT 1";
+constexpr char kRenew[] = "UPDATE node SET lease_until = clock_timestamp() + " POLYEST_LEASE
+                          ", address = $2, streams = $3, busy_cores = $4 WHERE node = $1 AND "
+                          "lease_until > clock_timestamp() RETURNING draining";
 constexpr char kRenewLapsed[] =
     "INSERT INTO node (node, name, address, draining, lease_until) OVERRIDING SYSTEM VALUE VALUES "
-    "($1, $2, $3, $4, clock_timestamp() + interval '3 s') ON CONFLICT (node) DO UPDATE SET "
-    "lease_until = "
-    "excluded.lease_until, address = excluded.address";
+    "($1, $2, $3, $4, clock_timestamp() + " POLYEST_LEASE
+    ") ON CONFLICT (node) DO UPDATE SET lease_until = excluded.lease_until, address = "
+    "excluded.address";
 constexpr char kEndEarlierRun[] =
     "WITH gone AS (DELETE FROM node WHERE node <> $1 AND name = $2 RETURNING node) UPDATE owner "
     "SET "
@@ -109,7 +107,7 @@ absl::Status PostgresNode::Register(PostgresConnection& connection) {
   POLYEST_ASSIGN_OR_RETURN(
       const PostgresResult result,
       connection.Query("INSERT INTO node (name, address, lease_until) VALUES ($1, '', "
-                       "clock_timestamp() + interval '3 s') RETURNING node",
+                       "clock_timestamp() + " POLYEST_LEASE ") RETURNING node",
                        PostgresParameters().AddText(name_)));
   number_ = result.Integer(0, 0);
   lease_until_ = (sent + kLease).time_since_epoch().count();
@@ -280,19 +278,16 @@ absl::StatusOr<SessionPlace> PostgresNode::Claim(int64_t session) {
   POLYEST_RETURN_IF_ERROR(Take(session));
   POLYEST_ASSIGN_OR_RETURN(const PostgresResult last,
                            pool_.Query(kLastPlace, PostgresParameters().Add(session)));
-  const int64_t sequence = last.rows() == 0 ? 0 : last.Integer(0, 0);
+  const SessionPlace place =
+      last.rows() == 0 ? SessionPlace() : ReadSessionPlace(PostgresRow(last, 0), 0);
   // Removes the parts of a batch that was never completed. The claim keeps its sender from adding
   // more.
   pool_
       .Query("DELETE FROM part WHERE session = $1 AND sequence > $2",
-             PostgresParameters().Add(session).Add(sequence))
+             PostgresParameters().Add(session).Add(place.sequence))
       .status()
       .IgnoreError();
-  if (last.rows() == 0) return SessionPlace();
-  return SessionPlace{last.Integer(0, 0),
-                      last.Integer(0, 1),
-                      last.Integer(0, 2),
-                      {static_cast<int>(last.Integer(0, 3)), last.Real(0, 4)}};
+  return place;
 }
 
 absl::Status PostgresNode::Take(int64_t session) {

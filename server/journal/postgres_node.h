@@ -32,7 +32,7 @@ namespace polyest::internal {
 // Thread-safe.
 class PostgresNode {
  public:
-  // What every write of a session carries.
+  // Goes with every write of a session.
   struct Hold {
     int64_t epoch = 0;
     std::string tenant;

@@ -7,10 +7,10 @@
 namespace polyest::internal {
 namespace {
 
-// A lease is of 3 s.
 constexpr char kNodes[] =
     "SELECT node, address, (SELECT count(*) FROM owner WHERE owner.node = node.node), streams, "
-    "busy_cores, (extract(epoch FROM clock_timestamp() - lease_until) + 3)::double precision, "
+    "busy_cores, extract(epoch FROM clock_timestamp() - lease_until + " POLYEST_LEASE
+    ")::double precision, "
     "draining, lease_until > clock_timestamp() FROM node WHERE lease_until > clock_timestamp() OR "
     "EXISTS (SELECT 1 FROM owner WHERE "
     "owner.node = node.node) ORDER BY node";

@@ -4,6 +4,7 @@
 
 #include <absl/status/statusor.h>
 
+#include <chrono>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -11,7 +12,12 @@
 #include "server/journal/postgres_pool.h"
 #include "server/journal/session_journal.h"
 
+// The length of a node's lease, for statements; the same as kLease.
+#define POLYEST_LEASE "interval '3 s'"
+
 namespace polyest::internal {
+
+inline constexpr std::chrono::seconds kLease{3};
 
 // Do what SharedJournal's Nodes and DrainNode do.
 absl::StatusOr<std::vector<JournalNode>> ReadNodes(PostgresPool& pool);

@@ -39,21 +39,6 @@ constexpr char kPage[] =
     "$2 ORDER BY sequence LIMIT 256) batch) summed WHERE size <= 8388608 OR sequence = $2 + 1) "
     "page ON true WHERE number = $1 ORDER BY 1";
 
-// Is one row of a result.
-class PostgresRow {
- public:
-  PostgresRow(const PostgresResult& result, int row) : result_(result), row_(row) {}
-
-  int64_t Integer(int column) const { return result_.Integer(row_, column); }
-  double Real(int column) const { return result_.Real(row_, column); }
-  bool Flag(int column) const { return result_.Flag(row_, column); }
-  std::string Bytes(int column) const { return result_.Bytes(row_, column); }
-
- private:
-  const PostgresResult& result_;
-  const int row_;
-};
-
 SessionHead HeadIn(const PostgresResult& result, int number) {
   const PostgresRow row(result, number);
   SessionHead head = ReadSessionHead(row);

@@ -28,15 +28,6 @@ bool HasGoodPort(const Settings& settings) {
          port->second.find_first_not_of("0123456789,") == std::string::npos;
 }
 
-std::string LabelOf(const Settings& settings) {
-  const auto value = [&](const char* name, const char* otherwise) -> std::string {
-    const auto found = settings.find(name);
-    return found == settings.end() ? otherwise : found->second;
-  };
-  return absl::StrCat(value("host", "the local socket"), ", port ", value("port", "5432"),
-                      ", database ", value("dbname", "of the user's name"));
-}
-
 }  // namespace
 
 absl::StatusOr<PostgresTarget> PostgresTarget::Parse(const std::string& uri) {
@@ -59,7 +50,7 @@ absl::StatusOr<PostgresTarget> PostgresTarget::Parse(const std::string& uri) {
                        "); name a file that holds it with passfile=FILE or $PGPASSFILE"));
     }
   }
-  return PostgresTarget(uri, LabelOf(settings));
+  return PostgresTarget(uri);
 }
 
 bool IsPostgresUri(const std::string& text) {

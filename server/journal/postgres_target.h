@@ -17,15 +17,11 @@ class PostgresTarget {
   static absl::StatusOr<PostgresTarget> Parse(const std::string& uri);
 
   const std::string& uri() const { return uri_; }
-  // Returns hosts, ports and database, for the log.
-  const std::string& label() const { return label_; }
 
  private:
-  PostgresTarget(std::string uri, std::string label)
-      : uri_(std::move(uri)), label_(std::move(label)) {}
+  explicit PostgresTarget(std::string uri) : uri_(std::move(uri)) {}
 
   std::string uri_;
-  std::string label_;
 };
 
 // Returns whether a text is meant to be the URI of a PostgreSQL database.
