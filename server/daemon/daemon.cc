@@ -8,7 +8,6 @@
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/health_check_service_interface.h>
 #include <grpcpp/resource_quota.h>
-#include <grpcpp/server_builder.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
@@ -74,6 +73,15 @@ google::protobuf::Timestamp Now() {
   now.set_nanos(static_cast<int32_t>(
       std::chrono::duration_cast<std::chrono::nanoseconds>(since - seconds).count()));
   return now;
+}
+
+// Sets what holds for all of gRPC in this process.
+void PrepareGrpc() {
+  grpc::EnableDefaultHealthCheckService(true);
+  grpc::reflection::InitProtoReflectionServerBuilderPlugin();
+  // Debian's Abseil looks for cycles in the order of gRPC's mutexes, which takes a tenth of the
+  // time of a stream of small batches.
+  absl::SetMutexDeadlockDetectionMode(absl::OnDeadlockCycle::kIgnore);
 }
 
 void SetKeepalive(grpc::ServerBuilder& builder) {
@@ -197,9 +205,11 @@ absl::StatusOr<std::unique_ptr<Daemon>> Daemon::Start(const DaemonOptions& optio
       .limits =
           LimitConnections(descriptors, options.max_connections, options.max_connections_per_peer),
       .descriptors = descriptors});
-  POLYEST_RETURN_IF_ERROR(daemon->TellMetrics());
+  POLYEST_RETURN_IF_ERROR(daemon->StartMetrics());
   POLYEST_RETURN_IF_ERROR(daemon->OpenWeb());
   POLYEST_RETURN_IF_ERROR(daemon->Listen());
+  POLYEST_RETURN_IF_ERROR(daemon->StartServer());
+  daemon->LetClientsIn();
   daemon->WatchFiles();
   return daemon;
 }
@@ -256,30 +266,37 @@ LoggedCaller Daemon::Logged(const grpc::ServerContextBase& call) const {
 }
 
 absl::Status Daemon::Listen() {
-  grpc::EnableDefaultHealthCheckService(true);
-  grpc::reflection::InitProtoReflectionServerBuilderPlugin();
-  // Debian's Abseil looks for cycles in the order of gRPC's mutexes, which takes a tenth of the
-  // time of a stream of small batches.
-  absl::SetMutexDeadlockDetectionMode(absl::OnDeadlockCycle::kIgnore);
-  grpc::ServerBuilder builder;
-  const auto credentials =
-      tls_ == nullptr ? grpc::InsecureServerCredentials() : tls_->Credentials();
   for (ListenAddress& address : addresses_) {
     POLYEST_RETURN_IF_ERROR(listener_->Listen(address));
   }
-  listener_->Serve(builder, credentials);
-  builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, kHandshakeTimeoutMs);
-  builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, kMaxConcurrentStreams);
-  builder.SetMaxReceiveMessageSize(options_.max_message_mb * 1024 * 1024);
-  SetKeepalive(builder);
-  builder.SetResourceQuota(
-      grpc::ResourceQuota("polyestd").Resize(static_cast<size_t>(BufferBytes())));
+  return absl::OkStatus();
+}
+
+absl::Status Daemon::StartServer() {
+  PrepareGrpc();
+  grpc::ServerBuilder builder;
+  listener_->Serve(builder,
+                   tls_ == nullptr ? grpc::InsecureServerCredentials() : tls_->Credentials());
+  LimitClients(builder);
   for (const auto& service : services_) builder.RegisterService(service.get());
   ObserveCalls(builder, metrics_, audit_.get(),
                [this](const grpc::ServerContextBase& call) { return Logged(call); });
   server_ = builder.BuildAndStart();
   if (server_ == nullptr) return absl::InternalError("gRPC's server cannot be started");
   self_check_ = std::make_unique<SelfCheck>(*server_);
+  return absl::OkStatus();
+}
+
+void Daemon::LimitClients(grpc::ServerBuilder& builder) const {
+  builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, kHandshakeTimeoutMs);
+  builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, kMaxConcurrentStreams);
+  builder.SetMaxReceiveMessageSize(options_.max_message_mb * 1024 * 1024);
+  SetKeepalive(builder);
+  builder.SetResourceQuota(
+      grpc::ResourceQuota("polyestd").Resize(static_cast<size_t>(BufferBytes())));
+}
+
+void Daemon::LetClientsIn() {
   ServeWeb();
   for (const google::protobuf::ServiceDescriptor* const service : Services()) {
     server_->GetHealthCheckService()->SetServingStatus(service->full_name(), true);
@@ -288,7 +305,6 @@ absl::Status Daemon::Listen() {
   Advertise();
   readiness_.Start(server_->GetHealthCheckService(), Described());
   if (audit_ != nullptr) audit_->Add("started", Described());
-  return absl::OkStatus();
 }
 
 // Answers those who call over HTTP.
@@ -314,7 +330,7 @@ LogFields Daemon::Described() const {
                                        listener_->limits().per_peer, " of a peer")}};
 }
 
-absl::Status Daemon::TellMetrics() {
+absl::Status Daemon::StartMetrics() {
   if (!options_.metrics) return absl::OkStatus();
   const auto gauges = std::make_shared<DaemonGauges>(
       *sessions_, executor_, calls_, options_.data_dir, readiness_.ready(), *listener_);

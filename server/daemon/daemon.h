@@ -5,6 +5,7 @@
 #include <absl/status/statusor.h>
 #include <grpcpp/impl/service_type.h>
 #include <grpcpp/server.h>
+#include <grpcpp/server_builder.h>
 
 #include <chrono>
 #include <memory>
@@ -127,12 +128,19 @@ class Daemon {
   absl::Status OpenWeb();
   absl::StatusOr<std::unique_ptr<WebPort>> OpenHttp(WebPort::Protocol protocol,
                                                     std::optional<ListenAddress>& address);
-  void ServeWeb();
+  // Takes the addresses, but lets nobody in yet.
   absl::Status Listen();
+  // Starts gRPC's server, which gets its connections from the listener.
+  absl::Status StartServer();
+  // Bounds what the server's clients may send and how many streams they may open.
+  void LimitClients(grpc::ServerBuilder& builder) const;
+  // Begins to accept connections and to answer calls, and says so to all who want to know.
+  void LetClientsIn();
+  void ServeWeb();
   // Returns what logs say of a call's caller.
   LoggedCaller Logged(const grpc::ServerContextBase& call) const;
   int64_t BufferBytes() const;
-  absl::Status TellMetrics();
+  absl::Status StartMetrics();
   // Returns what the log says about the daemon once it is ready.
   LogFields Described() const;
 
