@@ -19,10 +19,10 @@ constexpr size_t kMaxWrites = 512;
 
 template <typename Database>
 CommitQueue<Database>::CommitQueue(std::unique_ptr<Database> database, OnCommit on_commit,
-                                   Room room)
+                                   FullDisk full_disk)
     : database_(std::move(database)),
       on_commit_(std::move(on_commit)),
-      room_(std::move(room)),
+      full_disk_(std::move(full_disk)),
       thread_([this] { Serve(); }) {}
 
 template <typename Database>
@@ -133,7 +133,7 @@ void CommitQueue<Database>::TakeLazy(Group& group) {
 // On a full disk, writes that free room are committed without the others, which are refused.
 template <typename Database>
 void CommitQueue<Database>::Commit(Group group) {
-  const absl::Status room = room_.check ? room_.check(*database_) : absl::OkStatus();
+  const absl::Status room = full_disk_.check ? full_disk_.check(*database_) : absl::OkStatus();
   const size_t submitted = group.writes.size();
   if (!room.ok() && RefuseThoseThatNeedRoom(group, room) && on_commit_) {
     on_commit_({submitted - group.writes.size(), {}, room, /*room=*/false});
@@ -147,7 +147,7 @@ void CommitQueue<Database>::Commit(Group group) {
     on_commit_({group.writes.size(), duration, committed, room.ok()});
   }
   if (IsDiskFull(committed)) {
-    const bool made = room_.make && room_.make();
+    const bool made = full_disk_.make && full_disk_.make();
     // What is left is tried again, since it is less or there is more room; so this ends.
     if (RefuseThoseThatNeedRoom(group, committed) || made) return Commit(std::move(group));
   }

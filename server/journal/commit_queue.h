@@ -48,17 +48,17 @@ class CommitQueue {
   // Called once, from the writing thread, with OK when the write is on disk.
   using Done = std::function<void(const absl::Status&)>;
 
-  // What the writing thread does about a full disk. Default: nothing.
-  struct Room {
+  // Tells the writing thread what to do about a full disk. Default: nothing.
+  struct FullDisk {
     // Returns with what writes that need room are refused before a commit, if at all.
     std::function<absl::Status(Database&)> check{};
-    // Called when the disk is full; returns whether that has made room.
+    // Called when the disk is full; returns whether that has freed some of it.
     std::function<bool()> make{};
   };
 
-  CommitQueue(std::unique_ptr<Database> database, OnCommit on_commit, Room room);
+  CommitQueue(std::unique_ptr<Database> database, OnCommit on_commit, FullDisk full_disk);
   explicit CommitQueue(std::unique_ptr<Database> database, OnCommit on_commit = {})
-      : CommitQueue(std::move(database), std::move(on_commit), Room()) {}
+      : CommitQueue(std::move(database), std::move(on_commit), FullDisk()) {}
   // Writes everything submitted, then ends.
   ~CommitQueue();
   CommitQueue(const CommitQueue&) = delete;
@@ -114,7 +114,7 @@ class CommitQueue {
 
   std::unique_ptr<Database> database_;
   const OnCommit on_commit_;
-  const Room room_;
+  const FullDisk full_disk_;
   std::mutex mutex_;
   std::condition_variable submitted_;
   std::map<std::string, std::deque<Item>> lanes_;    // those with writes

@@ -51,7 +51,7 @@ class DraftFile {
   int descriptor_;
 };
 
-absl::Status CheckRoom(const std::string& file, SqliteDatabase& source) {
+absl::Status CheckDiskHolds(const std::string& file, SqliteDatabase& source) {
   POLYEST_ASSIGN_OR_RETURN(const int64_t pages, source.Number("PRAGMA page_count"));
   POLYEST_ASSIGN_OR_RETURN(const int64_t page_bytes, source.Number("PRAGMA page_size"));
   struct statvfs disk {};
@@ -103,7 +103,7 @@ absl::StatusOr<std::vector<Seal>> SqliteJournal::BeginSnapshot(SqliteDatabase& s
 absl::StatusOr<JournalContents> SqliteJournal::CopyTo(const std::string& file, int descriptor,
                                                       const Stop& stop) {
   POLYEST_ASSIGN_OR_RETURN(const auto source, SqliteDatabase::Open(folder_->journal_file()));
-  POLYEST_RETURN_IF_ERROR(CheckRoom(file, *source));
+  POLYEST_RETURN_IF_ERROR(CheckDiskHolds(file, *source));
   POLYEST_ASSIGN_OR_RETURN(const auto copy, SqliteDatabase::Open(file));
   // What is copied is synced here; nobody needs a half of it.
   POLYEST_RETURN_IF_ERROR(copy->Execute("PRAGMA journal_mode = OFF; PRAGMA synchronous = OFF"));

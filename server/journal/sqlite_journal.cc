@@ -100,9 +100,9 @@ SqliteJournal::SqliteJournal(std::unique_ptr<DataFolder> folder,
   CheckDisk(*writer).IgnoreError();
   queue_ = std::make_unique<CommitQueue<SqliteDatabase>>(
       std::move(writer), seal,
-      CommitQueue<SqliteDatabase>::Room{
+      CommitQueue<SqliteDatabase>::FullDisk{
           .check = [this](SqliteDatabase& database) { return CheckDisk(database); },
-          .make = [this] { return MakeRoom(); }});
+          .make = [this] { return FreeDisk(); }});
   maintenance_thread_ = std::jthread([this](std::stop_token stop) { Maintain(stop); });
 }
 

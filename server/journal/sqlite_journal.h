@@ -88,7 +88,7 @@ class SqliteJournal final : public SessionJournal {
   std::string LaneOf(int64_t session) const;
   // Returns OK if there is room on the disk for more than deletions, else the refusal.
   absl::Status CheckDisk(SqliteDatabase& database);
-  bool MakeRoom();
+  bool FreeDisk();
   void Maintain(std::stop_token stop);
   void Checkpoint();
   absl::StatusOr<bool> RemoveSomeDeleted();
@@ -112,7 +112,7 @@ class SqliteJournal final : public SessionJournal {
   std::mutex maintenance_mutex_;
   std::condition_variable_any maintenance_;
   std::atomic<int> log_pages_ = 0;  // pages in the write-ahead log
-  bool short_of_room_ = false;      // whether the log is to be copied, however short it is
+  bool short_of_disk_ = false;      // whether the log is to be copied, however short it is
   bool deleted_ = true;             // whether there may be batches of deleted sessions
 
   const std::unique_ptr<SessionSeals> seals_;

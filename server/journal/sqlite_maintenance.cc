@@ -49,19 +49,19 @@ void SqliteJournal::WakeMaintenance() {
 }
 
 void SqliteJournal::Maintain(std::stop_token stop) {
-  bool removing = true, short_of_room = false;
+  bool removing = true, short_of_disk = false;
   while (!stop.stop_requested()) {
     {
       std::unique_lock lock(maintenance_mutex_);
       if (!removing) {
         maintenance_.wait(lock, stop, [this] {
-          return log_pages_ >= checkpoint_pages_ || deleted_ || short_of_room_;
+          return log_pages_ >= checkpoint_pages_ || deleted_ || short_of_disk_;
         });
       }
-      short_of_room = std::exchange(short_of_room_, false);
-      removing = std::exchange(deleted_, false) || removing || short_of_room;
+      short_of_disk = std::exchange(short_of_disk_, false);
+      removing = std::exchange(deleted_, false) || removing || short_of_disk;
     }
-    if (log_pages_ >= checkpoint_pages_ || short_of_room) Checkpoint();
+    if (log_pages_ >= checkpoint_pages_ || short_of_disk) Checkpoint();
     // If the disk fails, what is left is removed when another session is deleted, when the disk is
     // full, or after the journal is opened again.
     if (removing) removing = RemoveSomeDeleted().value_or(false);
@@ -82,12 +82,12 @@ absl::Status SqliteJournal::CheckDisk(SqliteDatabase& database) {
   }
   if (held != DiskReserve::Held::kNothing) return absl::OkStatus();
   const std::lock_guard lock(maintenance_mutex_);
-  short_of_room_ = true;
+  short_of_disk_ = true;
   maintenance_.notify_one();
   return DiskFull();
 }
 
-bool SqliteJournal::MakeRoom() {
+bool SqliteJournal::FreeDisk() {
   const bool made = reserve_->GiveUp();
   if (made) spdlog::warn("the disk is full: no measurements are taken until there is room");
   return made;
@@ -105,7 +105,7 @@ void SqliteJournal::Checkpoint() {
     return sqlite3_wal_checkpoint_v2(handle, nullptr, SQLITE_CHECKPOINT_PASSIVE, &pages, &copied);
   };
   // The file may have to grow.
-  if (IsDiskFull(FromSqlite(copy(), "the log")) && MakeRoom()) copy();
+  if (IsDiskFull(FromSqlite(copy(), "the log")) && FreeDisk()) copy();
   if (pages - copied < kShortRest || pages > kLongLog) {
     sqlite3_busy_timeout(handle, 0);
     sqlite3_wal_checkpoint_v2(handle, nullptr, SQLITE_CHECKPOINT_TRUNCATE, nullptr, nullptr);

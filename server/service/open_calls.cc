@@ -40,7 +40,7 @@ absl::Status Moving() {
                 {.reason = kOwnedElsewhere, .retry_delay = std::chrono::milliseconds(100)});
 }
 
-absl::Status OpenCalls::CheckRoom(Kind kind, const std::string& tenant) const {
+absl::Status OpenCalls::CheckMayEnter(Kind kind, const std::string& tenant) const {
   const auto share = shares_.find(tenant);
   const auto place = static_cast<size_t>(kind);
   if (kind == Kind::kUnary) {
@@ -63,7 +63,7 @@ absl::StatusOr<std::unique_ptr<OpenCalls::Ticket>> OpenCalls::Enter(
     Kind kind, const std::string& tenant, std::weak_ptr<Drainable> stream) {
   std::lock_guard lock(mutex_);
   if (draining_) return ShuttingDown();
-  POLYEST_RETURN_IF_ERROR(CheckRoom(kind, tenant));
+  POLYEST_RETURN_IF_ERROR(CheckMayEnter(kind, tenant));
   if (kind != Kind::kUnary) {
     auto& streams = streams_[static_cast<int>(kind)];
     // Streams that ended are removed when they outnumber the others.

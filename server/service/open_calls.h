@@ -84,7 +84,7 @@ class OpenCalls {
  private:
   static constexpr int kKinds = 3;
 
-  // What is open of a tenant.
+  // Counts the open calls of a tenant, and the bytes of its answers.
   struct Share {
     int open[kKinds] = {};
     int64_t answer_bytes = 0;
@@ -92,7 +92,7 @@ class OpenCalls {
 
   void Leave(const Ticket& ticket);
   // Returns why there is no room for a call. Called with the mutex held.
-  absl::Status CheckRoom(Kind kind, const std::string& tenant) const;
+  absl::Status CheckMayEnter(Kind kind, const std::string& tenant) const;
   void DrainKind(Kind kind);
   int& open(Kind kind) { return open_[static_cast<int>(kind)]; }
 

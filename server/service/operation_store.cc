@@ -186,7 +186,7 @@ OperationStore::OfTenant(const std::string& tenant) {
           entries_.upper_bound({tenant, std::numeric_limits<int64_t>::max()})};
 }
 
-absl::Status OperationStore::MakeRoom(const std::string& tenant) {
+absl::Status OperationStore::MakePlace(const std::string& tenant) {
   const auto [first, last] = OfTenant(tenant);
   const auto places = places_.find(tenant);
   const bool full = places != places_.end() && places->second >= limits_.per_tenant;
@@ -234,7 +234,7 @@ absl::StatusOr<v1::Operation> OperationStore::Start(const std::string& tenant,
   {
     const std::lock_guard lock(mutex_);
     ForgetOld();
-    POLYEST_RETURN_IF_ERROR(MakeRoom(tenant));
+    POLYEST_RETURN_IF_ERROR(MakePlace(tenant));
     place = std::make_shared<Place>(*this, tenant);
     key = {tenant, ++started_};
     entries_[key] = entry;

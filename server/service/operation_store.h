@@ -78,7 +78,7 @@ class OperationStore {
 
   // The following are called with the mutex held.
   void ForgetOld();
-  absl::Status MakeRoom(const std::string& tenant);
+  absl::Status MakePlace(const std::string& tenant);
   // Forgets the oldest results of the tenant beyond their limit.
   void BoundResults(const std::string& tenant);
   std::pair<Entries::iterator, Entries::iterator> OfTenant(const std::string& tenant);

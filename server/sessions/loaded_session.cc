@@ -74,11 +74,12 @@ void LoadedSession::ReadFrom(const SessionJournal& journal, int64_t session) {
   computed_.store->ReadFrom(journal, session);
 }
 
-void LoadedSession::Attach(SessionJournal& journal, int64_t session, TakeSnapshotRoom take_room) {
+void LoadedSession::Attach(SessionJournal& journal, int64_t session,
+                           TakeSnapshotStorage take_storage) {
   ReadFrom(journal, session);
-  save_ = [this, &journal, take_room = std::move(take_room)](EstimatorSnapshot snapshot) {
+  save_ = [this, &journal, take_storage = std::move(take_storage)](EstimatorSnapshot snapshot) {
     std::string state = computed_.cuts.Prepend(std::move(snapshot.state));
-    if (!take_room(static_cast<int64_t>(state.size()))) return;
+    if (!take_storage(static_cast<int64_t>(state.size()))) return;
     journal.SaveSnapshot(number_, {computed_.sequence, snapshot.rows, std::move(state)});
   };
 }
@@ -188,8 +189,8 @@ absl::Status LoadedSession::ProcessUpTo(int64_t sequence, const Stop& stop) {
   });
 }
 
-// Where the numerics fail twice after the same number of rows, the cause is not the row that
-// follows but what is computed after the one before it.
+// If the numerics fail twice after the same number of rows, the cause is not the row that follows
+// but what is computed after the one before it.
 absl::Status LoadedSession::EndFailedRun(const absl::Status& reason, const Stop& stop) {
   const int64_t processed = computed_.estimator->rows_processed();
   const bool at_next = processed < computed_.store->rows() && processed != failed_rows_;

@@ -56,13 +56,14 @@ class LoadedSession {
                                                              const Options& options,
                                                              const Stop& stop);
 
-  // Returns whether there is room for a snapshot of so many bytes in place of the last one.
-  using TakeSnapshotRoom = std::function<bool(int64_t bytes)>;
+  // Counts a snapshot of so many bytes as stored, in place of the last one, if it may be; returns
+  // whether it may.
+  using TakeSnapshotStorage = std::function<bool(int64_t bytes)>;
 
   // From here on, gives the estimator's snapshots to the journal, as those of this session, as far
   // as there is room for them, and reads rows that are no longer in memory from it. The journal
   // must outlive this.
-  void Attach(SessionJournal& journal, int64_t session, TakeSnapshotRoom take_room);
+  void Attach(SessionJournal& journal, int64_t session, TakeSnapshotStorage take_storage);
   // Lets go of the rows of batches up to `sequence`, which the journal must keep.
   void Release(int64_t sequence) { computed_.store->Release(sequence); }
 
@@ -111,7 +112,7 @@ class LoadedSession {
   absl::Status WithEstimator(const Work& work);
 
  private:
-  // What is computed of the batches that have been given to the estimator.
+  // Holds the estimator, and what belongs to the batches that it has been given.
   struct Computed {
     RunCuts cuts;
     std::shared_ptr<JournalStore> store;  // the estimator's; refers to the intake's problem

@@ -16,12 +16,13 @@
 
 namespace polyest::internal {
 
-class Session::Computing {
+class Session::TimedComputation {
  public:
-  Computing(Session& session, const LoadedSession& loaded) : session_(session), loaded_(loaded) {
+  TimedComputation(Session& session, const LoadedSession& loaded)
+      : session_(session), loaded_(loaded) {
     session_.activity_.OnComputing();
   }
-  ~Computing() {
+  ~TimedComputation() {
     const Clock::duration spent = Clock::now() - begin_;
     if (session_.services_.metrics != nullptr) {
       session_.services_.metrics->CountComputing(std::chrono::duration<double>(spent).count());
@@ -29,8 +30,8 @@ class Session::Computing {
     session_.activity_.OnComputed(spent, loaded_.sequence(), loaded_.measured_s());
     session_.Weigh();
   }
-  Computing(const Computing&) = delete;
-  Computing& operator=(const Computing&) = delete;
+  TimedComputation(const TimedComputation&) = delete;
+  TimedComputation& operator=(const TimedComputation&) = delete;
 
  private:
   Session& session_;
@@ -48,7 +49,7 @@ Session::Session(const SessionServices& services, SessionHead head,
       observers_(std::make_shared<ObserverList>(head_.name, services.executor,
                                                 head_.tenant + "/sessions")) {
   if (loaded == nullptr) return;
-  loaded->Attach(services.journal, number(), services.SnapshotRoom(number(), tenant()));
+  loaded->Attach(services.journal, number(), services.StorageForSnapshots(number(), tenant()));
   Replace({std::move(loaded), 0});
 }
 
@@ -105,14 +106,14 @@ absl::Status Session::CheckOpen() const {
   return absl::NotFoundError(absl::StrCat(name(), " has been deleted"));
 }
 
-absl::Status Session::TakeRoom(const SessionPlace& place, const v1::Measurements& batch,
-                               int64_t bytes) const {
+absl::Status Session::TakeStorage(const SessionPlace& place, const v1::Measurements& batch,
+                                  int64_t bytes) const {
   POLYEST_RETURN_IF_ERROR(CheckRows(services_.limits, place, batch));
   if (services_.stored == nullptr) return absl::OkStatus();
   return services_.stored->Take(number(), tenant(), {batch.time_s_size(), bytes});
 }
 
-void Session::ReleaseRoom(const StoredAmount& amount) const {
+void Session::ReleaseStorage(const StoredAmount& amount) const {
   if (services_.stored != nullptr) services_.stored->Release(number(), amount);
 }
 
@@ -140,15 +141,15 @@ absl::StatusOr<v1::Acknowledgement> Session::Add(int64_t sequence, const v1::Mea
     // A rig whose batches are computed as fast as they come, and in order, needs no more memory.
     const bool held = intake.waiting_rows() > 0 || intake.held_bytes() > 0;
     if (held) POLYEST_RETURN_IF_ERROR(CheckMemory(bytes));
-    POLYEST_RETURN_IF_ERROR(TakeRoom(before, batch, bytes));
-    absl::Cleanup release_room = [&] { ReleaseRoom({batch.time_s_size(), bytes}); };
+    POLYEST_RETURN_IF_ERROR(TakeStorage(before, batch, bytes));
+    absl::Cleanup release = [&] { ReleaseStorage({batch.time_s_size(), bytes}); };
     const auto record = [&](const SessionPlace& place) {
       entry.place = place;
       return ledger_.Take(place, entry.digest, present.losses);
     };
     POLYEST_RETURN_IF_ERROR(intake.Take(batch, services_.limits.problem, record));
     const int64_t values = entry.place.samples - before.samples;
-    std::move(release_room).Cancel();
+    std::move(release).Cancel();
     if (services_.tenant_memory != nullptr) services_.tenant_memory->Add(number(), bytes);
     Keep(std::move(entry), present.losses, batch.time_s_size(), values,
          intake.measured_s() - measured_s);
@@ -170,14 +171,14 @@ void Session::Keep(JournalEntry entry, uint64_t losses, int64_t rows, int64_t va
         if (Metrics* const metrics = self->services_.metrics; metrics != nullptr && kept.ok()) {
           metrics->Count(Metrics::Batch{amount.rows, values, measured_s, duration.count()});
         }
-        if (!kept.ok()) self->ReleaseRoom(amount);
+        if (!kept.ok()) self->ReleaseStorage(amount);
         self->ledger_.Settle(losses, sequence, kept);
       });
 }
 
 absl::Status Session::ProcessUpTo(int64_t sequence, const Stop& stop) {
   POLYEST_ASSIGN_OR_RETURN(const auto loaded, Loaded(stop));
-  const Computing computing(*this, *loaded);
+  const TimedComputation computation(*this, *loaded);
   return ProcessIn(*loaded, sequence, stop);
 }
 
@@ -207,7 +208,7 @@ absl::StatusOr<SharedEstimate> Session::LatestEstimate(const Stop& stop) {
   SharedEstimate latest;
   const Clock::time_point begin = Clock::now();
   {
-    const Computing computing(*this, *loaded);
+    const TimedComputation computation(*this, *loaded);
     POLYEST_ASSIGN_OR_RETURN(latest, loaded->CurrentEstimate(stop));
   }
   if (latest != published_) Publish(latest, Clock::now() - begin);
@@ -262,7 +263,7 @@ absl::StatusOr<RunCuts> Session::Cuts(const Stop& stop) {
 
 absl::Status Session::WithEstimator(const LoadedSession::Work& work, const Stop& stop) {
   POLYEST_ASSIGN_OR_RETURN(const auto loaded, Loaded(stop));
-  const Computing computing(*this, *loaded);
+  const TimedComputation computation(*this, *loaded);
   POLYEST_RETURN_IF_ERROR(ProcessIn(*loaded, std::numeric_limits<int64_t>::max(), stop));
   return loaded->WithEstimator(work);
 }

@@ -53,8 +53,9 @@ struct SessionServices {
                                  const ProblemLimits& problem_limits = {}) const {
     return {models, problem_limits, std::move(check_memory), executor.threads_per_lane()};
   }
-  // Returns what takes room for the snapshots of a session.
-  LoadedSession::TakeSnapshotRoom SnapshotRoom(int64_t session, const std::string& tenant) const {
+  // Returns what counts the snapshots of a session as stored, if its tenant may store them.
+  LoadedSession::TakeSnapshotStorage StorageForSnapshots(int64_t session,
+                                                         const std::string& tenant) const {
     return [counted = stored, session, tenant](int64_t bytes) {
       return counted == nullptr || counted->TakeSnapshot(session, tenant, bytes);
     };
@@ -199,7 +200,7 @@ class Session : public std::enable_shared_from_this<Session> {
 
  private:
   // Measures the time of a computation.
-  class Computing;
+  class TimedComputation;
   // Holds what is in memory of the session, and the number of losses that it takes into account.
   struct InMemory {
     std::shared_ptr<LoadedSession> loaded;  // null: the session is not loaded
@@ -208,10 +209,11 @@ class Session : public std::enable_shared_from_this<Session> {
 
   // Makes this daemon the session's owner if it may be another one's.
   absl::Status Own();
-  // Checks that the next batch, serialized in so many bytes, keeps to the limits, and takes room.
-  absl::Status TakeRoom(const SessionPlace& place, const v1::Measurements& batch,
-                        int64_t bytes) const;
-  void ReleaseRoom(const StoredAmount& amount) const;
+  // Checks that the next batch, serialized in so many bytes, keeps to the limits, and counts
+  // it as stored.
+  absl::Status TakeStorage(const SessionPlace& place, const v1::Measurements& batch,
+                           int64_t bytes) const;
+  void ReleaseStorage(const StoredAmount& amount) const;
   // Returns the loaded session; loads it first if need be. Batches taken may wait in it for the
   // numerics.
   absl::StatusOr<std::shared_ptr<LoadedSession>> Loaded(const Stop& stop);

@@ -79,7 +79,7 @@ absl::Status SessionImport::TakeHead(const std::string& id, const v1::SessionRec
   POLYEST_RETURN_IF_ERROR(
       CheckReorderWindow({"record", "head", "reorderWindowS"}, head.reorder_window_s()));
   head_.reorder_window_s = head.reorder_window_s();
-  POLYEST_RETURN_IF_ERROR(registry_.CheckRoom(head_.tenant, head_.name));
+  POLYEST_RETURN_IF_ERROR(registry_.CheckMayCreate(head_.tenant, head_.name));
   if (!HasJsonForm(head.create_time())) {
     return InvalidField("record.head.createTime",
                         absl::StrFormat("%d s and %d ns must lie in the years 1 to 9999, with 0 to "
@@ -101,7 +101,8 @@ absl::Status SessionImport::Store(const v1::Problem& problem, const Stop& stop) 
       LoadedSession::Make(problem, head_.reorder_window_s,
                           services.Loading(check_memory, services.limits.problem), stop));
   POLYEST_ASSIGN_OR_RETURN(head_.number, services.journal.Create(head_, problem, /*hidden=*/true));
-  loaded->Attach(services.journal, head_.number, services.SnapshotRoom(head_.number, head_.tenant));
+  loaded->Attach(services.journal, head_.number,
+                 services.StorageForSnapshots(head_.number, head_.tenant));
   loaded_ = std::move(loaded);
   services.tenant_memory->Set(head_.number, head_.tenant, loaded_->memory_bytes());
   const auto bytes = static_cast<int64_t>(DeterministicBytes(problem).size());

@@ -1,4 +1,4 @@
-// How a session comes into memory and leaves it.
+// Brings a session into memory, and takes it out (session.h).
 
 #include <absl/strings/str_format.h>
 
@@ -75,7 +75,7 @@ absl::StatusOr<std::shared_ptr<LoadedSession>> Session::Loaded(const Stop& stop)
   POLYEST_ASSIGN_OR_RETURN(std::shared_ptr<LoadedSession> loaded,
                            LoadedSession::Load(services_.journal, head_, ledger_.kept(),
                                                services_.Loading(check_memory), stop));
-  loaded->Attach(services_.journal, number(), services_.SnapshotRoom(number(), tenant()));
+  loaded->Attach(services_.journal, number(), services_.StorageForSnapshots(number(), tenant()));
   Log(spdlog::level::info, "session loaded", {{"session", name()}, {"tenant", tenant()}});
   published_ = nullptr;
   history_.reset();
@@ -128,7 +128,7 @@ void Session::Drop() {
 }
 
 void Session::Unload(Clock::duration idle) {
-  // What it still holds after a lack of memory leaves the next time.
+  // If memory lacks for this, what the session still holds leaves the next time.
   Guarded([&] {
     UnloadIfIdle(idle);
     return absl::OkStatus();

@@ -141,7 +141,8 @@ absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Add(const Key& key,
   return sessions_[key] = std::move(session);
 }
 
-absl::Status SessionRegistry::CheckRoom(const std::string& tenant, const std::string& name) const {
+absl::Status SessionRegistry::CheckMayCreate(const std::string& tenant,
+                                             const std::string& name) const {
   const std::lock_guard lock(mutex_);
   return CheckFree({tenant, name});
 }

@@ -52,10 +52,10 @@ class SessionRegistry {
   // Deletes a session and closes it; NOT_FOUND when there is none. Waits for the journal.
   absl::Status Delete(const std::string& tenant, const std::string& name);
 
-  // The following two are for SessionImport. CheckRoom refuses a name that is taken, and any name
-  // when a limit is reached. Adopt adds a session that the journal keeps; RESOURCE_EXHAUSTED, with
-  // the session deleted, when others have come first and a limit of sessions is reached.
-  absl::Status CheckRoom(const std::string& tenant, const std::string& name) const;
+  // The following two are for SessionImport. CheckMayCreate refuses a name that is taken, and any
+  // name when a limit is reached. Adopt adds a session that the journal keeps; RESOURCE_EXHAUSTED,
+  // with the session deleted, when others have come first and a limit of sessions is reached.
+  absl::Status CheckMayCreate(const std::string& tenant, const std::string& name) const;
   absl::StatusOr<std::shared_ptr<Session>> Adopt(SessionHead head,
                                                  std::unique_ptr<LoadedSession> loaded);
 
