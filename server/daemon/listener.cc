@@ -155,8 +155,8 @@ std::optional<bool> Listener::DialOne(const sockaddr_storage& address,
                                       std::chrono::steady_clock::time_point deadline, bool http2) {
   const Descriptor client(
       ::socket(address.ss_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
-  // Where it comes from is chosen first, so that the connection is known when it arrives: the same
-  // address, which is this machine's, and any port.
+  // The connection's origin is chosen first, so that it is known when it arrives: the same address,
+  // which is this machine's, and any port.
   sockaddr_storage from = address;
   SetPort(from, 0);
   socklen_t size = sizeof(from);

@@ -64,7 +64,7 @@ class Executor {
     int running = 0;
     bool in_turn = false;
   };
-  // What a thread of the executor waits by while it sleeps.
+  // Is waited on by a thread of the executor while it sleeps.
   struct Worker {
     std::condition_variable woken;
     bool asleep = false;

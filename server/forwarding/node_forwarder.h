@@ -25,7 +25,7 @@ namespace polyest::internal {
 // Thread-safe. Calls under way may outlive it.
 class NodeForwarder {
  public:
-  // What a call to another daemon needs: its context, and the channel it goes by.
+  // Holds what a call to another daemon needs: its context, and the channel it goes by.
   struct Passage {
     std::unique_ptr<grpc::ClientContext> context;
     std::shared_ptr<grpc::Channel> channel;

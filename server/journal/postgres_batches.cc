@@ -17,7 +17,7 @@ constexpr char kLookAtSessions[] =
     "true";
 constexpr char kInsertBatch[] =
     "INSERT INTO batch VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10)";
-// Where a batch in parts is concerned, whether all of them are there is known in the database only.
+// Inserts a batch in parts; the database alone knows whether all of them are there.
 constexpr char kInsertBatchIfWhole[] =
     "INSERT INTO batch SELECT $1, $2, $3, $4, $5, $6, $7, $8, $9, $10 WHERE ($2 = 1 OR EXISTS "
     "(SELECT 1 FROM batch WHERE session = $1 AND sequence = $2 - 1)) AND $10 = (SELECT count(*) "

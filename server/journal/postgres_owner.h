@@ -1,6 +1,6 @@
 #pragma once
 
-// Who changes a session in PostgreSQL, and with what others are refused.
+// Identifies the daemon that may change a session in PostgreSQL, and makes the refusals of others.
 
 #include <absl/status/status.h>
 

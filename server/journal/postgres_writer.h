@@ -43,7 +43,8 @@ class PostgresWriter {
   absl::Status Commit(const std::vector<Write>& writes, std::vector<absl::Status>& outcomes);
 
  private:
-  // What a write has added to the group: a statement, a batch, or the end of a session's batches.
+  // Is a statement, a batch, or the end of a session's batches, which a write has added to the
+  // group.
   struct Sent {
     size_t write = 0;  // number of the write in the group
     PostgresStatement statement{};

@@ -1,4 +1,4 @@
-// What is read from the journal (sqlite_journal.h), each time with a connection of its own.
+// Reads from the journal (sqlite_journal.h), each time with a connection of its own.
 
 #include <absl/strings/str_format.h>
 

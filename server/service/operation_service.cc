@@ -39,9 +39,9 @@ OperationLimits LimitsOf(const ServiceContext& context) {
   return limits;
 }
 
-// Where a page of operations begins: behind the operation `after` of the daemon `node`. Its token
-// is "node-after", or "after" where daemons do not pass calls on. Both are numbers, so that the
-// token outlives the operation.
+// Says where a page of operations begins: behind the operation `after` of the daemon `node`. Its
+// token is "node-after", or "after" where daemons do not pass calls on. Both are numbers, so that
+// the token outlives the operation.
 struct PageStart {
   int64_t node = 0;  // 0: that lists only its own
   int64_t after = 0;

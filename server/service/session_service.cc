@@ -110,7 +110,7 @@ class SessionService final : public v1::SessionService::CallbackService {
 SessionService::Unary* SessionService::CreateSession(Context* call,
                                                      const v1::CreateSessionRequest* request,
                                                      v1::Session* response) {
-  // Where the daemon that was chosen does not take it, this one does.
+  // If the daemon that was chosen does not take it, this one does.
   const auto placed = std::make_shared<bool>(false);
   const size_t answer_bytes = request->session().problem().ByteSizeLong() + kDescriptionBytes;
   return ForCaller({.context = call,

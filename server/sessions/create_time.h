@@ -1,7 +1,8 @@
 #pragma once
 
-// When a session was created, as its messages may say: from the year 1 to 9999, the times that have
-// a form in JSON. Journals of earlier versions may hold others, from imported files.
+// Checks the times at which sessions were created. Messages may carry those from the year 1 to
+// 9999, which have a form in JSON; journals of earlier versions may hold others, from imported
+// files.
 
 #include <google/protobuf/timestamp.pb.h>
 

@@ -45,7 +45,7 @@ class RowReorder {
   // The largest number of rows held back.
   static constexpr int64_t kMaxHeldRows = 100'000;
 
-  // Where in a sequence of batches the same rows are to be released once more.
+  // Says where a sequence of batches begins that is to release the same rows once more.
   struct Resumption {
     int64_t first_batch = 1;            // the batch that comes next
     std::optional<SampleRow> released;  // the last row released before; none: no row was

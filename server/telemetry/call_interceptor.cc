@@ -94,7 +94,7 @@ bool IsAudited(absl::string_view method, grpc::StatusCode code) {
          method == "ExportSession" || method == "DownloadBackup";
 }
 
-// What all calls of a server share.
+// Is shared by all calls of a server.
 struct Observers {
   Metrics& metrics;
   AuditLog* audit;  // null without one

@@ -1,6 +1,6 @@
 #pragma once
 
-// What a stream of events to an HTTP client is made of.
+// Yields the events of a stream to an HTTP client, from a call or from a shared watch.
 
 #include <absl/status/statusor.h>
 #include <google/protobuf/descriptor.h>

@@ -31,7 +31,7 @@ bool IsOrigin(absl::string_view origin, const std::string& authority) {
 
 HostCheck::HostCheck(std::string listen_host, std::vector<std::string> names)
     : names_(std::move(names)) {
-  // Who listens on all addresses is reached by none of these two.
+  // These two stand for all addresses; no client calls the daemon by them.
   if (listen_host != "0.0.0.0" && listen_host != "[::]") names_.push_back(std::move(listen_host));
   for (std::string& name : names_) absl::AsciiStrToLower(&name);
 }

@@ -31,8 +31,8 @@ constexpr int64_t kLargeAnswer = 1 << 20;
 // keeps the lines around chunks in memory that nobody else counts.
 constexpr size_t kMaxBetweenPieces = size_t{8} << 10;
 
-// What the library reads from and writes to. Refuses to read more of a head, or of what is around
-// the pieces of a body, than is allowed.
+// Is the stream from which the library reads and to which it writes. Refuses to read more of a
+// head, or of the lines around the pieces of a body, than is allowed.
 class LimitedStream final : public httplib::Stream {
  public:
   LimitedStream(ClientSocket& socket, const HttpLimits& limits)
@@ -144,7 +144,7 @@ class RequestLoop final : private httplib::Server {
   BodyMemory& memory_;
   const HttpHandler& handler_;
   LimitedStream stream_;
-  // What is known of the present request.
+  // These belong to the present request.
   HttpRequest request_;
   std::optional<HttpAnswer> refusal_;
   std::optional<BodyMemory::Share> share_;

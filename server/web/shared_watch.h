@@ -71,9 +71,9 @@ class SharedWatch {
   std::thread reader_;
 };
 
-// What one client gets of a watch, which ends with its last client. As in a watch of one's own, a
-// slow client misses estimates but never the last one. Whoever comes later begins with the last
-// estimate that was made, which need not be of the last batch.
+// Gives one client the events of a watch, which ends with its last client. As in a watch of one's
+// own, a slow client misses estimates but never the last one. A client that comes later begins with
+// the last estimate that was made, which need not be of the last batch.
 class WatchEvents final : public EventSource {
  public:
   explicit WatchEvents(std::shared_ptr<SharedWatch> watch);
@@ -103,7 +103,7 @@ class WatchEvents final : public EventSource {
 // The watches of a server. Thread-safe.
 class SharedWatches {
  public:
-  // Who asks, as far as it decides on what is seen, and for what; whatever the order.
+  // Holds the request, and all of its client that decides on what this may see, in any fixed order.
   using Key = std::vector<std::string>;
 
   explicit SharedWatches(std::shared_ptr<grpc::Channel> channel) : channel_(std::move(channel)) {}

@@ -21,7 +21,7 @@ namespace polyest::internal {
 
 class WebPort {
  public:
-  // What the port speaks.
+  // Says which protocol the port speaks.
   enum class Protocol {
     kCallsAndPage,  // calls as JSON, and the live page (gateway.h)
     kUmBridge,      // umbridge_gateway.h
