@@ -90,6 +90,8 @@ void PrintTables(const Analysis& analysis, std::ostream& out) {
   out << absl::StrFormat("\nexpansion: order %d, %d terms, %d points\n",
                          analysis.expansion().order(), analysis.expansion().term_count(),
                          analysis.expansion().point_count());
+  out << absl::StrFormat("compared with the model at %d draws of the prior\n",
+                         analysis.draw_count());
   PrintDiagnostics(analysis.diagnostics(), out);
 }
 

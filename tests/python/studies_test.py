@@ -132,6 +132,7 @@ def test_sensitivities_are_shares(client, problem):
     x = sensitivity["x"]
     assert x.total.shape == (len(sensitivity.time_s), 2) == x.first_order.shape
     assert (x.total >= x.first_order - 1e-9).all() and (x.total <= 1 + 1e-9).all()
+    assert sensitivity.draw_count == 64
     # The stiffness shifts the phase by far more than the damping changes the amplitude.
     assert next(iter(sensitivity.activity)) == "k"
     frame = sensitivity.to_dataframe("x")

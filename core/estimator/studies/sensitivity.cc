@@ -238,6 +238,7 @@ absl::StatusOr<SensitivityAnalysis> AnalyzeSensitivity(const ResolvedProblem& pr
   result.order = expansion->basis().order();
   result.terms = expansion->basis().size();
   result.points = expansion->points();
+  result.draws = expansion->draws();
   Diagnose(problem, *expansion, model_variance, result);
   return result;
 }

@@ -86,6 +86,7 @@ struct SensitivityAnalysis {
   int order = 0;                            // of the expansion, p
   int terms = 0;                            // of the expansion, S
   int points = 0;                           // of collocation, Q
+  int draws = 0;                            // of the prior, besides
   // kExpansionInaccurate when the expansion differs from the model by more than kUnexplained of an
   // output's variance; kPointsFailed.
   std::vector<Diagnostic> diagnostics;

@@ -109,6 +109,7 @@ v1::ComputeSensitivityResponse ToProto(const SensitivityAnalysis& analysis) {
     added.set_peak_to_noise(activity.peak_to_noise);
   }
   *response.mutable_expansion() = ToExpansionUsed(analysis);
+  response.set_draw_count(analysis.draws);
   for (const Diagnostic& diagnostic : analysis.diagnostics) {
     *response.add_diagnostics() = ToProto(diagnostic);
   }

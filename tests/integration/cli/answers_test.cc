@@ -129,7 +129,15 @@ TEST_F(CommandTest, RanksTheParametersThatMatter) {
   EXPECT_EQ(response.activity(1).parameter(), "c");
   EXPECT_NEAR(response.activity(1).peak_to_noise(), 7, 0.5);
   EXPECT_EQ(response.time_s_size(), 101);
+  EXPECT_EQ(response.draw_count(), 512);
   EXPECT_EQ(response.diagnostics_size(), 0);
+}
+
+TEST_F(CommandTest, SaysAtHowManyDrawsASensitivityIsComparedWithTheModel) {
+  const Finished run =
+      Run({"sensitivity", Example("oscillator.json"), "--until", "1", "--draws", "16"});
+  ASSERT_EQ(run.exit_status, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("compared with the model at 16 draws of the prior\n"));
 }
 
 TEST_F(CommandTest, PrintsOneCsvRowATimeOfTheSensitivities) {

@@ -225,6 +225,7 @@ TEST(AnalyzeSensitivity, AnswersRowsOfTimesByParameters) {
   EXPECT_EQ(x.noise_std_dev_size(), 3);
   EXPECT_EQ(response->activity(0).parameter(), "a");
   EXPECT_EQ(response->expansion().order(), 3);
+  EXPECT_EQ(response->draw_count(), 512);
 }
 
 TEST(SensitivityOptions, ComeFromTheRequest) {

@@ -151,6 +151,8 @@ class Sensitivity:
     expansion: ExpansionUsed
     #: Warnings, as of an estimate.
     diagnostics: list[Diagnostic]
+    #: Draws of the prior at which the model itself ran.
+    draw_count: int
 
     def __getitem__(self, output: str) -> SensitivityOutput:
         """Returns one output. Raises KeyError."""
@@ -188,4 +190,5 @@ def sensitivity_of(message: study_service_pb2.ComputeSensitivityResponse) -> Sen
                        {one.parameter: (one.share, one.peak_to_noise)
                         for one in message.activity},
                        ExpansionUsed.of_message(message.expansion),
-                       [Diagnostic.of_message(one) for one in message.diagnostics])
+                       [Diagnostic.of_message(one) for one in message.diagnostics],
+                       message.draw_count)
