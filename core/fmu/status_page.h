@@ -27,7 +27,6 @@ enum class FmuCall : int32_t {
 struct StatusPage {
   std::atomic<uint64_t> calls;  // number of calls so far
   std::atomic<FmuCall> call;
-  std::atomic<int32_t> point;  // index of the trajectory in the worker
   std::atomic<double> time_s;
   std::array<char, 512> message;  // zero-terminated
 };

@@ -51,7 +51,7 @@ bool Instance::CheckFinite(std::span<const double> values) {
 
 bool Instance::Instantiate() {
   const bool shares = factory_.interface.once_per_process && factory_.interface.can_save_state;
-  factory_.monitor->Enter(FmuCall::kInstantiate, point_, 0);
+  factory_.monitor->Enter(FmuCall::kInstantiate, 0);
   if (!shares || factory_.shared == nullptr) {
     const std::string name = absl::StrCat(factory_.interface.name, "_", point_);
     factory_.said.clear();
@@ -74,7 +74,7 @@ bool Instance::Instantiate() {
 // before.
 bool Instance::Activate() {
   if (factory_.shared == nullptr || factory_.active == this) return true;
-  factory_.monitor->Enter(FmuCall::kState, point_, time_s_);
+  factory_.monitor->Enter(FmuCall::kState, time_s_);
   Instance* const other = factory_.active;
   factory_.active = nullptr;
   if (other != nullptr && !other->broken_ && binding_->SaveState(&other->state_) > kFmuWarning) {
@@ -93,7 +93,7 @@ template <class Call>
 bool Instance::Do(FmuCall kind, Call call) {
   if (broken_ || !Activate()) return false;
   factory_.said.clear();
-  factory_.monitor->Enter(kind, point_, time_s_);
+  factory_.monitor->Enter(kind, time_s_);
   const int status = call();
   factory_.monitor->Leave();
   if (IsGood(status)) return true;

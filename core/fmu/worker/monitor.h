@@ -13,9 +13,8 @@ class Monitor {
   explicit Monitor(StatusPage* page) : page_(page) {}
 
   // Records the start of a call of an FMU function.
-  void Enter(FmuCall call, int point, double time_s) {
+  void Enter(FmuCall call, double time_s) {
     page_->call.store(call, std::memory_order_relaxed);
-    page_->point.store(point, std::memory_order_relaxed);
     page_->time_s.store(time_s, std::memory_order_relaxed);
     // This is the only writer, so no atomic addition is needed.
     page_->calls.store(page_->calls.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);

@@ -49,7 +49,7 @@ absl::StatusOr<std::unique_ptr<Simulation>> Simulation::Start(StartMessage start
     signals.push_back(std::move(signal));
   }
   POLYEST_RETURN_IF_ERROR(CheckInstances(start.interface, start.parameter_values.rows()));
-  monitor->Enter(FmuCall::kLoad, 0, 0);
+  monitor->Enter(FmuCall::kLoad, 0);
   const auto load = start.interface.version == 2 ? LoadFmi2 : LoadFmi3;
   POLYEST_ASSIGN_OR_RETURN(std::unique_ptr<FmuLibrary> library,
                            load(start.interface, start.library, start.resources));
