@@ -3,11 +3,9 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 #include <absl/strings/str_join.h>
-#include <absl/synchronization/mutex.h>
 #include <grpc/support/time.h>
-#include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/health_check_service_interface.h>
-#include <grpcpp/resource_quota.h>
+#include <grpcpp/server_builder.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
@@ -21,6 +19,7 @@
 
 #include "core/common/status.h"
 #include "core/umbridge/open_models.h"
+#include "server/daemon/grpc_settings.h"
 #include "server/journal/memory_journal.h"
 #include "server/journal/sqlite_journal.h"
 #include "server/service/services.h"
@@ -30,14 +29,8 @@
 namespace polyest::internal {
 namespace {
 
-// Clients ping every 20 s, also while no call is open, and other daemons every 2 s.
-constexpr int kShortestPingIntervalMs = 1'000;
-constexpr int kKeepaliveTimeMs = 60'000;
-constexpr int kKeepaliveTimeoutMs = 20'000;
 // Memory of gRPC for what clients send where the daemon's memory is not limited, MiB.
 constexpr int64_t kBufferMb = 1'024;
-// Largest number of streams of one connection.
-constexpr int kMaxConcurrentStreams = 1'000;
 // Largest number of tasks of an executor that wait or run, and of those in one lane. A tenant has
 // two lanes for its calls, and so takes half of that executor at most, and one lane of the intake.
 constexpr int kWaitingTasks = 20'000;
@@ -50,8 +43,6 @@ constexpr int kBusyLanes = 8;
 constexpr int kNiceness = 5;
 // Number of threads that take batches. They wait for nothing but, now and then, the journal.
 constexpr int kIntakeThreads = 4;
-// Longest time until a new connection has ended its handshakes, TLS's and HTTP/2's.
-constexpr int kHandshakeTimeoutMs = 20'000;
 // Longest time that the last bytes of ended calls may take.
 constexpr int kFlushTimeS = 1;
 constexpr std::chrono::seconds kFlushTime{kFlushTimeS};
@@ -73,23 +64,6 @@ google::protobuf::Timestamp Now() {
   now.set_nanos(static_cast<int32_t>(
       std::chrono::duration_cast<std::chrono::nanoseconds>(since - seconds).count()));
   return now;
-}
-
-// Sets what holds for all of gRPC in this process.
-void PrepareGrpc() {
-  grpc::EnableDefaultHealthCheckService(true);
-  grpc::reflection::InitProtoReflectionServerBuilderPlugin();
-  // Debian's Abseil looks for cycles in the order of gRPC's mutexes, which takes a tenth of the
-  // time of a stream of small batches.
-  absl::SetMutexDeadlockDetectionMode(absl::OnDeadlockCycle::kIgnore);
-}
-
-void SetKeepalive(grpc::ServerBuilder& builder) {
-  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveTimeMs);
-  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveTimeoutMs);
-  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
-  builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS,
-                             kShortestPingIntervalMs);
 }
 
 // Returns what streams may hold: a quarter of the memory that a tenant and the daemon may have.
@@ -277,7 +251,7 @@ absl::Status Daemon::StartServer() {
   grpc::ServerBuilder builder;
   listener_->Serve(builder,
                    tls_ == nullptr ? grpc::InsecureServerCredentials() : tls_->Credentials());
-  LimitClients(builder);
+  LimitClients(builder, options_.max_message_mb, BufferBytes());
   for (const auto& service : services_) builder.RegisterService(service.get());
   ObserveCalls(builder, metrics_, audit_.get(),
                [this](const grpc::ServerContextBase& call) { return Logged(call); });
@@ -285,15 +259,6 @@ absl::Status Daemon::StartServer() {
   if (server_ == nullptr) return absl::InternalError("gRPC's server cannot be started");
   self_check_ = std::make_unique<SelfCheck>(*server_);
   return absl::OkStatus();
-}
-
-void Daemon::LimitClients(grpc::ServerBuilder& builder) const {
-  builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, kHandshakeTimeoutMs);
-  builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, kMaxConcurrentStreams);
-  builder.SetMaxReceiveMessageSize(options_.max_message_mb * 1024 * 1024);
-  SetKeepalive(builder);
-  builder.SetResourceQuota(
-      grpc::ResourceQuota("polyestd").Resize(static_cast<size_t>(BufferBytes())));
 }
 
 void Daemon::LetClientsIn() {

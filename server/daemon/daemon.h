@@ -5,7 +5,6 @@
 #include <absl/status/statusor.h>
 #include <grpcpp/impl/service_type.h>
 #include <grpcpp/server.h>
-#include <grpcpp/server_builder.h>
 
 #include <chrono>
 #include <memory>
@@ -132,8 +131,6 @@ class Daemon {
   absl::Status Listen();
   // Starts gRPC's server, which gets its connections from the listener.
   absl::Status StartServer();
-  // Bounds what the server's clients may send and how many streams they may open.
-  void LimitClients(grpc::ServerBuilder& builder) const;
   // Begins to accept connections and to answer calls, and says so to all who want to know.
   void LetClientsIn();
   void ServeWeb();
