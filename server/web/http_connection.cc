@@ -129,6 +129,7 @@ class RequestLoop final : private httplib::Server {
   void OnHead(httplib::Request& request);
   // Returns why the body that the head announces cannot be read, if it cannot.
   std::optional<HttpAnswer> CheckBody(const httplib::Request& request);
+  HttpAnswer TooLarge() const;
   void OnBody(httplib::Response& response, const httplib::ContentReader& reader);
   // Reads the body; a refusal if that fails.
   std::optional<HttpAnswer> ReadBody(const httplib::ContentReader& reader, std::string& body);
@@ -262,14 +263,16 @@ std::optional<HttpAnswer> RequestLoop::CheckBody(const httplib::Request& request
   if (!has_body_) return std::nullopt;
   stream_.BeginBody(std::min<uint64_t>(length, limits_.body_bytes));
   if (request.method != "POST") return handler_.Refusal(400, "only POST may have a body");
-  if (lengths > 0 && length > limits_.body_bytes) {
-    return handler_.Refusal(413, absl::StrCat("the body has more than ", limits_.body_bytes >> 20,
-                                              " MiB (--max-message-mb)"));
-  }
+  if (lengths > 0 && length > limits_.body_bytes) return TooLarge();
   if (request.has_header("Content-Encoding")) {
     return handler_.Refusal(415, "the body must not be compressed");
   }
   return std::nullopt;
+}
+
+HttpAnswer RequestLoop::TooLarge() const {
+  return handler_.Refusal(413, absl::StrCat("the body has more than ", limits_.body_bytes >> 20,
+                                            " MiB (--max-message-mb)"));
 }
 
 std::optional<HttpAnswer> RequestLoop::ReadBody(const httplib::ContentReader& reader,
@@ -287,10 +290,7 @@ std::optional<HttpAnswer> RequestLoop::ReadBody(const httplib::ContentReader& re
   });
   if (read) return std::nullopt;
   close_ = true;
-  if (too_large) {
-    return handler_.Refusal(413, absl::StrCat("the body has more than ", limits_.body_bytes >> 20,
-                                              " MiB (--max-message-mb)"));
-  }
+  if (too_large) return TooLarge();
   if (no_memory) return handler_.Refusal(429, "too many large requests at once; try again later");
   if (stream_.failure() == 408) return handler_.Refusal(408, "the body is too slow");
   return handler_.Refusal(400, "the body ends too early, or its chunks are wrong");
