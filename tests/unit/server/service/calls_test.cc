@@ -6,7 +6,7 @@
 #include <new>
 
 #include "tests/testing/fake_shared_journal.h"
-#include "tests/testing/faulty_journal.h"
+#include "tests/unit/server/service/service_fixture.h"
 
 namespace polyest::internal {
 namespace {
@@ -19,26 +19,18 @@ class WithoutMemory final : public FakeSharedJournal {
   }
 };
 
-TEST(JobOfSession, FailsWhereTheSessionCannotBeLookedForForLackOfMemory) {
-  WithoutMemory shared;
-  FaultyJournal journal;
-  journal.Share(&shared);
-  ModelLibrary models;
-  OpenCalls calls;
-  const auto access = AccessControl::Open({}).value();
-  std::unique_ptr<SessionRegistry> sessions;
-  Executor executor({.threads_per_lane = 1, .threads = 1, .capacity = 10, .capacity_per_lane = 10});
-  const SessionServices services{.executor = executor, .journal = journal, .models = models};
-  sessions = SessionRegistry::Open(services, [] { return google::protobuf::Timestamp(); }).value();
-  const ServiceContext context{.executor = executor,
-                               .intake = executor,
-                               .sessions = *sessions,
-                               .calls = calls,
-                               .access = *access,
-                               .stop = {},
-                               .models = models,
-                               .max_computing = std::chrono::seconds(60),
-                               .wall_clock = {}};
+class JobOfSessionTest : public ServiceTest {
+ protected:
+  void SetUp() override {
+    journal_.Share(&shared_);
+    ServiceTest::SetUp();
+  }
+
+  WithoutMemory shared_;
+};
+
+TEST_F(JobOfSessionTest, FailsWhereTheSessionCannotBeLookedForForLackOfMemory) {
+  const ServiceContext context = Context();
   const auto job =
       JobOfSession(context, {.tenant = "t"}, "name", "sessions/a",
                    [](const std::shared_ptr<Session>&, const Stop&) { return absl::OkStatus(); });

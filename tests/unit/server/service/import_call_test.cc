@@ -10,9 +10,9 @@
 #include "server/digest/digest.h"
 #include "server/service/export_call.h"
 #include "server/sessions/session_import.h"
-#include "tests/testing/faulty_journal.h"
 #include "tests/testing/problem_json.h"
 #include "tests/testing/test_folder.h"
+#include "tests/unit/server/service/service_fixture.h"
 
 namespace polyest::internal {
 namespace {
@@ -61,13 +61,8 @@ class Reader final : public grpc::ServerCallbackReader<v1::ImportSessionRequest>
   std::binary_semaphore asked_{0};
 };
 
-class ImportCallTest : public testing::Test {
+class ImportCallTest : public ServiceTest {
  protected:
-  void SetUp() override {
-    const SessionServices services{.executor = executor_, .journal = journal_, .models = models_};
-    sessions_ =
-        SessionRegistry::Open(services, [] { return google::protobuf::Timestamp(); }).value();
-  }
   v1::SessionRecord Head() {
     v1::SessionRecord record;
     record.mutable_head()->set_name("sessions/a");
@@ -91,30 +86,9 @@ class ImportCallTest : public testing::Test {
       finished.set_value(status.error_code());
     };
   }
-  // Makes a context that lets in everybody, or whoever has a token.
-  ServiceContext Context(const std::string& token_file = "") {
-    access_ = AccessControl::Open({.token_file = token_file}).value();
-    return {.executor = executor_,
-            .intake = executor_,
-            .sessions = *sessions_,
-            .calls = calls_,
-            .access = *access_,
-            .stop = {},
-            .models = models_,
-            .max_computing = std::chrono::seconds(60),
-            .wall_clock = {}};
-  }
 
-  FaultyJournal journal_;
-  ModelLibrary models_;
-  OpenCalls calls_;
-  std::unique_ptr<AccessControl> access_;
   grpc::CallbackServerContext call_;
   v1::Session imported_;
-  std::unique_ptr<SessionRegistry> sessions_;
-  // The executor is destroyed first, so that it finishes its tasks while the rest still exists.
-  Executor executor_{
-      {.threads_per_lane = 1, .threads = 1, .capacity = 10, .capacity_per_lane = 10}};
 };
 
 TEST_F(ImportCallTest, KeepsNothingWhenItIsCancelledWhileARecordIsTaken) {

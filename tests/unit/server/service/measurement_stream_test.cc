@@ -9,8 +9,8 @@
 #include <semaphore>
 #include <thread>
 
-#include "tests/testing/faulty_journal.h"
 #include "tests/testing/problem_json.h"
+#include "tests/unit/server/service/service_fixture.h"
 
 namespace polyest::internal {
 namespace {
@@ -75,27 +75,12 @@ class Peer final : public grpc::ServerCallbackReaderWriter<Request, Response> {
   Executor writing_{{.threads_per_lane = 1, .threads = 1, .capacity = 10, .capacity_per_lane = 10}};
 };
 
-class MeasurementStreamTest : public testing::Test {
+class MeasurementStreamTest : public ServiceTest {
  protected:
+  MeasurementStreamTest() : ServiceTest(/*capacity=*/1) {}
   void SetUp() override {
-    const SessionServices services{.executor = executor_, .journal = journal_, .models = models_};
-    sessions_ =
-        SessionRegistry::Open(services, [] { return google::protobuf::Timestamp(); }).value();
-    access_ = AccessControl::Open({}).value();
-    ASSERT_TRUE(
-        sessions_->Create(access_->Authorize(call_, "GetStatus")->tenant, "a", SmallProblem())
-            .ok());
-  }
-  ServiceContext Context() {
-    return {.executor = executor_,
-            .intake = intake_,
-            .sessions = *sessions_,
-            .calls = calls_,
-            .access = *access_,
-            .stop = {},
-            .models = models_,
-            .max_computing = std::chrono::seconds(60),
-            .wall_clock = {}};
+    ServiceTest::SetUp();
+    ASSERT_TRUE(sessions_->Create("default", "a", SmallProblem()).ok());
   }
   static Request Batch(int64_t sequence) {
     Request request;
@@ -109,17 +94,7 @@ class MeasurementStreamTest : public testing::Test {
     return request;
   }
 
-  FaultyJournal journal_;
-  ModelLibrary models_;
-  OpenCalls calls_;
-  std::unique_ptr<AccessControl> access_;
   grpc::CallbackServerContext call_;
-  std::unique_ptr<SessionRegistry> sessions_;
-  const ExecutorOptions one_thread_{
-      .threads_per_lane = 1, .threads = 1, .capacity = 1, .capacity_per_lane = 1};
-  // The executors are destroyed first, so that they finish their tasks while the rest still exists.
-  Executor executor_{one_thread_};
-  Executor intake_{one_thread_};
 };
 
 TEST_F(MeasurementStreamTest, EndsWhereNoSessionIsNamedInTime) {

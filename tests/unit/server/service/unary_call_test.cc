@@ -5,29 +5,18 @@
 
 #include "polyest/v1/session_service.grpc.pb.h"
 #include "server/service/services.h"
-#include "tests/testing/faulty_journal.h"
 #include "tests/testing/problem_json.h"
+#include "tests/unit/server/service/service_fixture.h"
 
 namespace polyest::internal {
 namespace {
 
-// Serves the sessions within this process.
-class UnaryCallTest : public testing::Test {
+// Serves the sessions.
+class UnaryCallTest : public ServiceTest {
  protected:
   void SetUp() override {
-    const SessionServices services{.executor = executor_, .journal = journal_, .models = models_};
-    sessions_ =
-        SessionRegistry::Open(services, [] { return google::protobuf::Timestamp(); }).value();
-    access_ = AccessControl::Open({}).value();
-    service_ = MakeSessionService({.executor = executor_,
-                                   .intake = executor_,
-                                   .sessions = *sessions_,
-                                   .calls = calls_,
-                                   .access = *access_,
-                                   .stop = {},
-                                   .models = models_,
-                                   .max_computing = std::chrono::seconds(60),
-                                   .wall_clock = {}});
+    ServiceTest::SetUp();
+    service_ = MakeSessionService(Context());
     grpc::ServerBuilder builder;
     builder.RegisterService(service_.get());
     server_ = builder.BuildAndStart();
@@ -43,18 +32,10 @@ class UnaryCallTest : public testing::Test {
     v1::Session session;
     return stub_->CreateSession(&context, request, &session);
   }
-  std::string Tenant() const { return access_->Authorize(Identification(), "GetStatus")->tenant; }
 
-  FaultyJournal journal_;
-  ModelLibrary models_;
-  OpenCalls calls_;
-  std::unique_ptr<AccessControl> access_;
-  std::unique_ptr<SessionRegistry> sessions_;
   std::unique_ptr<grpc::Service> service_;
   std::unique_ptr<grpc::Server> server_;
   std::unique_ptr<v1::SessionService::Stub> stub_;
-  Executor executor_{
-      {.threads_per_lane = 1, .threads = 1, .capacity = 10, .capacity_per_lane = 10}};
 };
 
 // Returns a problem whose session is no small answer.
@@ -70,7 +51,7 @@ v1::Problem LargeProblem() {
 }
 
 TEST_F(UnaryCallTest, CreatesNoSessionWhoseAnswerHasNoRoom) {
-  auto unread = calls_.Enter(OpenCalls::Kind::kUnary, Tenant()).value();
+  auto unread = calls_.Enter(OpenCalls::Kind::kUnary, "default").value();
   ASSERT_TRUE(unread->HoldAnswer(OpenCalls::kMaxUnreadBytes - 1).ok());
   const grpc::Status refused = Create(LargeProblem());
   EXPECT_EQ(refused.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED) << refused.error_message();
@@ -81,7 +62,7 @@ TEST_F(UnaryCallTest, CreatesNoSessionWhoseAnswerHasNoRoom) {
 }
 
 TEST_F(UnaryCallTest, CreatesASmallSessionWhateverIsLeftUnread) {
-  const auto unread = calls_.Enter(OpenCalls::Kind::kUnary, Tenant()).value();
+  const auto unread = calls_.Enter(OpenCalls::Kind::kUnary, "default").value();
   ASSERT_TRUE(unread->HoldAnswer(OpenCalls::kMaxUnreadBytes - 1).ok());
   EXPECT_TRUE(Create(SmallProblem()).ok());
 }
