@@ -25,7 +25,7 @@ using Clock = ClientSocket::Clock;
 // still sends would otherwise not see the answer.
 constexpr size_t kMaxLinger = size_t{256} << 20;
 constexpr std::chrono::seconds kLinger{2};
-// Bytes of an answer that count against the memory for bodies.
+// An answer that is larger than its request by more than this counts against the memory for bodies.
 constexpr int64_t kLargeAnswer = 1 << 20;
 // Bytes that are read from one piece of a body to the next. The library reads pieces of 4 KiB, and
 // keeps the lines around chunks in memory that nobody else counts.
@@ -134,7 +134,7 @@ class RequestLoop final : private httplib::Server {
   // Reads the body; a refusal if that fails.
   std::optional<HttpAnswer> ReadBody(const httplib::ContentReader& reader, std::string& body);
   // Has the request answered; refuses it if there is no memory for the answer.
-  void PutAnswer(const std::string& body, httplib::Response& response);
+  void PutAnswer(std::string body, httplib::Response& response);
   // Gives the library the answer.
   void Put(HttpAnswer answer, httplib::Response& response) const;
   // Reads what the client still sends, for a short time.
@@ -303,13 +303,15 @@ void RequestLoop::OnBody(httplib::Response& response, const httplib::ContentRead
     response.set_header("Connection", "close");
     return Put(*std::move(refused), response);
   }
-  PutAnswer(body, response);
+  PutAnswer(std::move(body), response);
 }
 
-void RequestLoop::PutAnswer(const std::string& body, httplib::Response& response) {
+void RequestLoop::PutAnswer(std::string body, httplib::Response& response) {
   HttpAnswer answer = handler_.Answer(request_, body);
-  const auto size = static_cast<int64_t>(answer.body.size());
-  if (size > kLargeAnswer && !share_->Take(size)) {
+  // The answer takes over the memory of the request, which may have changed something.
+  const auto more = std::ssize(answer.body) - std::ssize(body);
+  body = std::string();
+  if (more > kLargeAnswer && !share_->Take(more)) {
     answer = handler_.Refusal(429, "too many large answers are unread; read them first");
   }
   Put(std::move(answer), response);

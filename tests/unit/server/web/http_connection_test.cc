@@ -247,6 +247,16 @@ TEST_F(HttpConnectionTest, HoldsNoMoreBodiesThanThereIsMemoryFor) {
               StartsWith("HTTP/1.1 200"));
 }
 
+// A request that has changed something is not refused its answer, which may repeat all of it.
+TEST_F(HttpConnectionTest, GivesAnAnswerTheMemoryOfItsRequest) {
+  constexpr int kBytes = 3 << 20;
+  limits_.body_bytes = kBytes;
+  EXPECT_THAT(Ask("POST /a HTTP/1.1\r\nHost: h\r\nContent-Length: " + std::to_string(kBytes) +
+                      "\r\n\r\n" + std::string(kBytes, 'x'),
+                  kBytes),
+              StartsWith("HTTP/1.1 200"));
+}
+
 TEST_F(HttpConnectionTest, HoldsNoMemoryBetweenTwoRequests) {
   Start(limits_, 600);
   for (int i = 0; i < 3; ++i) {
