@@ -134,9 +134,7 @@ void Listener::Refuse(int connection, const std::string& peer, const char* why) 
   const auto suppressed = warnings_.Admit(why);
   if (!suppressed) return;
   Log(spdlog::level::warn, "a connection was refused",
-      {{"peer", peer},
-       {"reason", why},
-       {"suppressed", *suppressed > 0 ? absl::StrCat(*suppressed) : ""}});
+      {{"peer", peer}, {"reason", why}, {"suppressed", SuppressedText(*suppressed)}});
 }
 
 bool Listener::Dial(std::chrono::milliseconds timeout, bool http2) {

@@ -183,7 +183,7 @@ class CallInterceptor final : public grpc::experimental::Interceptor {
     if (status.ok()) return "";
     const auto suppressed = limit.Admit(absl::StrCat(CodeName(status), " ", caller.tenant));
     if (!suppressed) return std::nullopt;
-    return *suppressed > 0 ? absl::StrCat(*suppressed) : "";
+    return SuppressedText(*suppressed);
   }
 
   LogFields Described(const grpc::Status& status, const LoggedCaller& caller) const {

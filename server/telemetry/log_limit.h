@@ -26,7 +26,7 @@ class LogLimit {
 
  private:
   struct Kind {
-    double room = 0;  // number of lines
+    double lines = 0;  // that may be logged at once
     Clock::time_point since;
     int64_t suppressed = 0;
   };
@@ -36,5 +36,8 @@ class LogLimit {
   std::mutex mutex_;
   std::map<std::string, Kind> kinds_;
 };
+
+// Returns a number of lines that were not logged as a field of the next one; empty for none.
+std::string SuppressedText(int64_t lines);
 
 }  // namespace polyest::internal

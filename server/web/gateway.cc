@@ -109,7 +109,7 @@ void Gateway::LogRefusal(const HttpRequest& request, const absl::Status& refusal
   Log(spdlog::level::warn, "refused over HTTP",
       {{"peer", request.peer},
        {"reason", std::string(refusal.message())},
-       {"suppressed", *suppressed > 0 ? absl::StrCat(*suppressed) : ""}});
+       {"suppressed", SuppressedText(*suppressed)}});
 }
 
 HttpAnswer Gateway::Answer(const HttpRequest& request, const std::string& body) const {
@@ -193,7 +193,7 @@ std::optional<HttpAnswer> Gateway::Read(const WebMethod& method, const HttpReque
   const rpc::Status read = FromJsonText(body, *method.method->input_type(), message);
   if (read.code() != StatusCode::OK) return ErrorAnswer(read);
   if (message.size() <= options_.message_bytes) return std::nullopt;
-  message = {};
+  message = std::string();
   return ErrorAnswer(413, StatusCode::RESOURCE_EXHAUSTED,
                      absl::StrCat("the message has more than ", options_.message_bytes >> 20,
                                   " MiB (--max-message-mb)"));
