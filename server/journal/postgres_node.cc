@@ -207,18 +207,24 @@ absl::Status PostgresNode::Beat() {
     draining_ = true;
     waiting_.notify_all();
   }
-  if (renewed.rows() == 0) {
-    spdlog::warn("this node's lease was over: others may have taken its sessions");
-    POLYEST_RETURN_IF_ERROR(
-        connection_
-            ->Query(kRenewLapsed,
-                    PostgresParameters().Add(number_).AddText(name_).AddText(address).AddFlag(
-                        draining_))
-            .status());
-    POLYEST_RETURN_IF_ERROR(Review(*connection_));
-  }
+  if (renewed.rows() == 0) POLYEST_RETURN_IF_ERROR(RenewLapsed(address));
   lease_until_ = (sent + kLease).time_since_epoch().count();
-  if (succeeded_ || address.empty() || name_.empty()) return absl::OkStatus();
+  const bool succeeds = !succeeded_ && !address.empty() && !name_.empty();
+  return succeeds ? EndEarlierRun() : absl::OkStatus();
+}
+
+absl::Status PostgresNode::RenewLapsed(const std::string& address) {
+  spdlog::warn("this node's lease was over: others may have taken its sessions");
+  POLYEST_RETURN_IF_ERROR(
+      connection_
+          ->Query(
+              kRenewLapsed,
+              PostgresParameters().Add(number_).AddText(name_).AddText(address).AddFlag(draining_))
+          .status());
+  return Review(*connection_);
+}
+
+absl::Status PostgresNode::EndEarlierRun() {
   POLYEST_RETURN_IF_ERROR(
       connection_->Query(kEndEarlierRun, PostgresParameters().Add(number_).AddText(name_))
           .status());

@@ -93,6 +93,10 @@ class PostgresNode {
   void Run(std::stop_token stop);
   // Renews the lease.
   absl::Status Beat();
+  // Takes the lease anew after it was over, and looks which sessions others have taken meanwhile.
+  absl::Status RenewLapsed(const std::string& address);
+  // Ends this node's earlier run, which loses its sessions; those never shown are dropped.
+  absl::Status EndEarlierRun();
   // Returns the processor time that this process has used a second since the last call.
   double BusyCores();
   // Forgets the sessions that other nodes have taken while the lease was over.
