@@ -211,10 +211,18 @@ absl::StatusOr<bool> MixtureComponent::EndWindow(const Stop& stop) {
     moved = moved || settled;
   }
   row_end_ = {};  // where nothing was settled
-  const int64_t to_learn = MinSamplesForNoise(problem_);
-  const bool learns_soon = learns_noise_ && taken_ < to_learn;
-  schedule_.EndWindow(taken_, learns_soon ? to_learn : std::numeric_limits<int64_t>::max());
+  schedule_.EndWindow(taken_, LatestWindowEnd());
   return moved;
+}
+
+// Returns the last row at which the window that begins now may end.
+int64_t MixtureComponent::LatestWindowEnd() const {
+  const int64_t to_learn = MinSamplesForNoise(problem_);
+  if (learns_noise_ && taken_ < to_learn) return to_learn;
+  if (learns_noise_ && HandlesOutliers(problem_.problem())) {
+    return schedule_.WeightsServeUntil(taken_);
+  }
+  return std::numeric_limits<int64_t>::max();
 }
 
 bool MixtureComponent::Leans() const {

@@ -129,6 +129,7 @@ class MixtureComponent {
   absl::StatusOr<bool> RefineBefore(int row, const Stop& stop);
   absl::StatusOr<bool> FinishRow(const Stop& stop);
   absl::StatusOr<bool> EndWindow(const Stop& stop);
+  int64_t LatestWindowEnd() const;
 
   // Moves of the expansion, each for a reason of its own.
   bool LooksAhead() const;

@@ -109,7 +109,7 @@ class Revision {
       if (correlated && weighted) ReviseCorrelation(c, sums, share, noise);
       if (!noise.learned) changed_ = noise.learned = true;
     }
-    if (HandlesOutliers()) RevisePosterior();
+    if (HandlesOutliers(problem_.problem())) RevisePosterior();
     if (!changed_) return std::nullopt;
     return noise_;
   }
@@ -293,13 +293,6 @@ class Revision {
     return model.outliers != OutlierHandling::kNone;
   }
 
-  bool HandlesOutliers() const {
-    for (int c = 0; c < problem_.channels(); ++c) {
-      if (IsWeighted(c)) return true;
-    }
-    return false;
-  }
-
   // Revises the posterior's centre and covariance from the curvature. The covariance is limited to
   // the prior's in every direction.
   void RevisePosterior() {
@@ -361,6 +354,12 @@ bool LearnsNoise(const Problem& problem) {
   if (UsesFilters(problem)) return false;
   return std::ranges::any_of(problem.measured, [&problem](const MeasuredOutput& m) {
     return IsLearned(m.noise) || (problem.expansion.adaptive && IsOfPrediction(m.noise));
+  });
+}
+
+bool HandlesOutliers(const Problem& problem) {
+  return std::ranges::any_of(problem.measured, [](const MeasuredOutput& m) {
+    return m.noise.outliers != OutlierHandling::kNone;
   });
 }
 

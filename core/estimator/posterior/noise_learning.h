@@ -46,6 +46,8 @@ std::optional<double> UnlearnedScale(const RecordSummary& record, size_t channel
 
 // Whether anything of the problem's noise is learned from the record.
 bool LearnsNoise(const Problem& problem);
+// Whether a channel has outliers, whose weights are taken at the minimum of the cost.
+bool HandlesOutliers(const Problem& problem);
 
 // Returns the revised noise, or nullopt when the present noise needs no revision. The minimum is
 // searched from the expansion's reference or the posterior known, and from the best of `particles`

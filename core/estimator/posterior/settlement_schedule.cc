@@ -10,8 +10,8 @@ constexpr double kWindowGrowth = 1.3;
 // After a settlement that did not help, further rows are taken with their discount before the next
 // attempt: the record since the windows' beginning, divided by this number.
 constexpr int64_t kAttemptsPerRecord = 8;
-// The region's edges are looked at again after the record since the windows' beginning, divided by
-// this number.
+// The region's edges, and weights of outliers, are looked at again after the record since the
+// windows' beginning, divided by this number.
 constexpr int64_t kLooksPerRecord = 20;
 // Where the posterior has not contracted enough, that is looked at again after the record divided
 // by this number.
@@ -22,6 +22,10 @@ constexpr int64_t kLooksAhead = 10;
 int64_t NextWindow(int64_t rows, int64_t from) {
   const auto window = static_cast<double>(rows - from);
   return std::max(rows + 2, from + static_cast<int64_t>(std::ceil(kWindowGrowth * window)));
+}
+
+int64_t SettlementSchedule::WeightsServeUntil(int64_t rows) const {
+  return rows + std::max<int64_t>(2, (rows - state_.windows_from) / kLooksPerRecord);
 }
 
 void SettlementSchedule::EndWindow(int64_t rows, int64_t latest_end) {

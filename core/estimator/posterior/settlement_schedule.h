@@ -56,6 +56,9 @@ class SettlementSchedule {
   bool StaysWhole(int64_t rows) const { return rows < state_.whole_until; }
   bool IsComparable(int64_t rows) const { return rows == state_.comparable_row; }
 
+  // Returns the row at which weights of outliers that were taken at `rows` are to be taken anew:
+  // until then the minimum about which they were taken has moved by a part of a standard deviation.
+  int64_t WeightsServeUntil(int64_t rows) const;
   // Begins the next window, which ends no later than `latest_end`.
   void EndWindow(int64_t rows, int64_t latest_end);
   // Puts the next look at the edges off, in proportion to the windows' length.

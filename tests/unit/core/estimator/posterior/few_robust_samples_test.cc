@@ -190,6 +190,26 @@ TEST_P(FewRobustSamples, PassIntoManyThatAreWeighted) {
   }
 }
 
+// The weights are renewed after every twentieth of the record, which here has a quarter of what is
+// known: the information grows as t⁵. The minimum then moves by half a standard deviation, of which
+// the weights of the old one, too steep by 7/5 (Σ w/Σ ρ″ of Student's t), withhold two sevenths.
+// Two standard deviations of that are 0.28, which also covers how unevenly the samples are spread.
+TEST_P(FewRobustSamples, HaveWeightsOfLateThatTheirMeanAgreesWith) {
+  const std::vector<UncertainParameter> prior = {*UncertainParameter::Normal("a", 0, 1)};
+  const Output growing = [](double a, double, double t) { return a * t * t / 10'000; };
+  for (uint64_t seed = 1; seed <= 12; ++seed) {
+    SCOPED_TRACE(seed);
+    std::mt19937_64 generator(seed);
+    std::student_t_distribution<double> heavy(4);
+    Record record{{}, 0.2, GetParam()};
+    for (int k = 1; k <= 290; ++k) {
+      record.values.push_back(growing(0.5, 0, k) + record.noise * heavy(generator));
+    }
+    const Exact exact = Quadrature(record, growing, prior, Vector{{0.4}}, Vector{{0.6}});
+    ExpectAgrees(EstimateOfRecord(record, "a*t^2/10000", prior), exact, 0.28, 0.14);
+  }
+}
+
 // Weights that were taken while little was known would make a gross error a misfit.
 TEST(FewSamplesOfStudentT, TakeAGrossErrorForNoMisfit) {
   for (const double gross : {3.0, 30.0, 300.0}) {
