@@ -6,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-#include "client/cli/held_out_rows.h"
+#include "client/cli/first_rows.h"
 #include "core/common/status.h"
 #include "proto/wire/convert/problem.h"
 

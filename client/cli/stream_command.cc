@@ -19,6 +19,7 @@
 #include "client/cli/data_input.h"
 #include "client/cli/estimate_format.h"
 #include "client/cli/exit_status.h"
+#include "client/cli/first_rows.h"
 #include "client/cli/input_files.h"
 #include "client/cli/interrupt.h"
 #include "client/cli/problem_input.h"
@@ -122,6 +123,9 @@ class StreamCommand {
     options.any_order = arguments_.reorder_window_s > 0;
     // A session that is resumed may already have the runs before. The daemon checks them.
     options.any_first_run = !arguments_.session.empty();
+    // Editors omit the end of a file's last line, but a program that writes it to a pipe has been
+    // stopped within the line, and within a number perhaps.
+    options.whole_lines = arguments_.data_file == "-";
     POLYEST_ASSIGN_OR_RETURN(const DataColumns columns,
                              DataColumnsFor(problem_, arguments_.place, options));
     auto reader = DataReader::Open(in, DataName(), columns);
@@ -212,6 +216,7 @@ class StreamCommand {
       if (interrupted()) break;  // the rows read may end within a row
     }
     if (sent_ == 0) TellOfResumption(session);
+    if (const std::string line = reader.UnendedLine(); !line.empty() && !interrupted()) Tell(line);
     if (!read.ok() && !interrupted()) return EndAtBadLine(session, stream, read);
     if (EndsRun() && sent_ > 0 && !interrupted()) {
       v1::Measurements end;
@@ -242,7 +247,7 @@ class StreamCommand {
     v1::Measurements& batch = refused.front();
     // The daemon need not name the first of several bad rows.
     for (int row; (row = RefusedRow(refusal).value_or(0)) > 0 && row < batch.time_s_size();) {
-      RemoveRowsFrom(row, batch);
+      batch = FirstRows(std::move(batch), row);
       const absl::Status sent = SendAlone(session, batch);
       if (sent.ok()) {
         kept += row;

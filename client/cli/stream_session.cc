@@ -138,15 +138,4 @@ int RemoveRowsUpTo(const RowPlace& place, v1::Measurements& batch) {
   return rows;
 }
 
-void RemoveRowsFrom(int row, v1::Measurements& batch) {
-  batch.mutable_time_s()->Truncate(row);
-  if (!batch.run().empty()) batch.mutable_run()->Truncate(row);
-  for (auto& channel : *batch.mutable_channels()) {
-    channel.mutable_values()->Truncate(row);
-    const auto& missing = channel.missing();
-    const auto kept = std::ranges::lower_bound(missing, row) - missing.begin();
-    channel.mutable_missing()->Truncate(static_cast<int>(kept));
-  }
-}
-
 }  // namespace polyest::internal

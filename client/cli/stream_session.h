@@ -37,7 +37,5 @@ absl::Status CheckZeroOfTime(Client& client, const StreamSession& session,
 
 // Removes the leading rows up to and including `place` and returns their number.
 int RemoveRowsUpTo(const RowPlace& place, v1::Measurements& batch);
-// Removes the rows from number `row` on, counted from 0.
-void RemoveRowsFrom(int row, v1::Measurements& batch);
 
 }  // namespace polyest::internal

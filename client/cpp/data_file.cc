@@ -102,8 +102,16 @@ class DataReader::Reader {
     return text.empty() ? "" : absl::StrCat(lines_.name(), ": ", text);
   }
 
+  std::string UnendedLine() const {
+    if (unended_line_ == 0) return "";
+    return absl::StrCat(
+        lines_.name(), ":", unended_line_, ": the last line has no end",
+        known_.options.whole_lines ? " and is left out" : "; its last value may be cut off");
+  }
+
  private:
   absl::StatusOr<bool> NextLine(absl::string_view& line);
+  bool LeavesOut();
   absl::Status Start(absl::string_view& line, bool& found, RefusedLine refused);
   void AddChannels(v1::Measurements& batch);
   void AddRow(v1::Measurements& batch);
@@ -114,6 +122,7 @@ class DataReader::Reader {
   std::vector<DataColumn> columns_;
   std::optional<RowParser> rows_;  // none before the first line below the header is read
   int64_t units_line_ = 0;
+  int64_t unended_line_ = 0;  // number of the last line if it has no end
   RowLines row_lines_;
   bool has_run_ = false;
   bool any_refused_ = false;
@@ -128,6 +137,12 @@ absl::StatusOr<bool> DataReader::Reader::NextLine(absl::string_view& line) {
     if (!found) return false;
   } while (IsLeftOut(line));
   return true;
+}
+
+// Whether the last line read, a row, is left out because it has no end.
+bool DataReader::Reader::LeavesOut() {
+  if (lines_.cut_off()) unended_line_ = lines_.line();
+  return lines_.cut_off() && known_.options.whole_lines;
 }
 
 // Reads the line below the header, which may be a row of units, and prepares for the rows. Sets
@@ -179,7 +194,7 @@ absl::Status DataReader::Reader::Read(int64_t max_rows, v1::Measurements& batch,
   while (batch.time_s_size() < max_rows) {
     POLYEST_ASSIGN_OR_RETURN(bool found, NextLine(line));
     if (!rows_) POLYEST_RETURN_IF_ERROR(Start(line, found, refused));
-    if (!found) {
+    if (!found || LeavesOut()) {
       ended_ = true;
       break;
     }
@@ -194,7 +209,8 @@ absl::Status DataReader::Reader::Read(int64_t max_rows, v1::Measurements& batch,
   }
   if (rows_->clock().rows() == 0 && !any_refused_) {
     return absl::InvalidArgumentError(
-        absl::StrCat(lines_.name(), ": has no rows below its header"));
+        absl::StrCat(lines_.name(), ": has no rows below its header",
+                     unended_line_ > 0 ? " but one that has no end" : ""));
   }
   return absl::OkStatus();
 }
@@ -225,6 +241,8 @@ absl::Status DataReader::Read(int64_t max_rows, v1::Measurements& batch, Refused
 
 std::string DataReader::Found() const { return reader_->Found(); }
 
+std::string DataReader::UnendedLine() const { return reader_->UnendedLine(); }
+
 const RowLines& DataReader::Lines() const { return reader_->Lines(); }
 
 bool DataReader::CountsFromFirstRow() const { return reader_->CountsFromFirstRow(); }
@@ -240,7 +258,11 @@ absl::StatusOr<v1::Measurements> ReadDataFile(const std::string& path, const Dat
   }
   POLYEST_ASSIGN_OR_RETURN(DataReader reader, DataReader::Open(in, path, columns, refused));
   auto data = reader.Read(std::numeric_limits<int64_t>::max(), refused);
-  if (found != nullptr) *found = reader.Found();
+  if (found != nullptr) {
+    *found = reader.Found();
+    const std::string unended = reader.UnendedLine();
+    absl::StrAppend(found, found->empty() || unended.empty() ? "" : "\n", unended);
+  }
   if (lines != nullptr) *lines = reader.Lines();
   return data;
 }

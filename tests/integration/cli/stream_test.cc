@@ -106,6 +106,22 @@ TEST_F(StreamTest, ReadsStandardInputAndPrintsATableAtTheEnd) {
   EXPECT_THAT(run.out, AllOf(HasSubstr("  k = "), HasSubstr("\n60 samples up to t = 3 s\n")));
 }
 
+// A program that is killed within "3.05,-0.8" leaves a displacement of 0 or so.
+TEST_F(StreamTest, TakesNoMeasurementFromALineThatThePipeCutsOff) {
+  const Finished run = Run(Command("-", {"--format", "jsonl"}), DemoRows(60) + "3.05,-0");
+  ASSERT_EQ(run.exit_status, 0) << run.err;
+  EXPECT_EQ(run.err, "polyest: standard input:62: the last line has no end and is left out\n");
+  ExpectSame(LastEstimate(run.out), EstimateOf(60));
+  std::string file = DemoRows(60);
+  file.pop_back();
+  const std::string data = File("d.csv", file);
+  const Finished whole = Run(Command(data, {"--format", "jsonl"}));
+  EXPECT_EQ(whole.err, "polyest: " + data +
+                           ":61: the last line has no end; its last value may be "
+                           "cut off\n");
+  ExpectSame(LastEstimate(whole.out), EstimateOf(60));
+}
+
 TEST_F(StreamTest, ResumesASessionWhereItEnded) {
   const Finished first =
       Run(Command(File("d.csv", DemoRows(45)), {"--format", "jsonl", "--session", "rig-1"}));

@@ -3,6 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <sstream>
+
+#include "tests/testing/test_folder.h"
 #include "tests/unit/client/data_file_cases.h"
 
 namespace polyest::internal {
@@ -50,6 +53,43 @@ TEST(DataPipe, CountsRowsWithSeparators) {
   std::string found;
   Outcome(text, nullptr, &found);
   EXPECT_EQ(found, "d.csv: semicolons; 1,234 rows from 0 s");
+}
+
+// A program that is killed leaves what it had written so far of a block: "0.3,0.123" as "0.3,0".
+TEST(DataPipe, TakesNoMeasurementFromALineWithoutItsEnd) {
+  const auto whole_lines = [](DataColumns& columns) { columns.options.whole_lines = true; };
+  EXPECT_EQ(Outcome("t,x\n0.1,1\n0.2,2\n0.3,0", whole_lines), "t=0.1,0.2 x=1,2");
+  EXPECT_EQ(Outcome("t,x\n0.1,1\n0.2,2\n", whole_lines), "t=0.1,0.2 x=1,2");
+  EXPECT_EQ(Outcome("t,x\n0.1,1\r\n0.2", whole_lines), "t=0.1 x=1");
+  EXPECT_EQ(Outcome("t,x\n0.1,1", whole_lines),
+            "d.csv: has no rows below its header but one that has no end");
+}
+
+TEST(DataPipe, SaysThatALineHasNoEnd) {
+  const auto said = [](const std::string& text, bool whole_lines) {
+    DataColumns columns = XAndForce();
+    columns.options.whole_lines = whole_lines;
+    std::istringstream in(text);
+    auto reader = DataReader::Open(in, "pipe", columns);
+    EXPECT_TRUE(reader.ok() && reader->Read(10).ok());
+    return reader->UnendedLine();
+  };
+  EXPECT_EQ(said("t,x\n0,1\n1,2", true), "pipe:3: the last line has no end and is left out");
+  EXPECT_EQ(said("t,x\n0,1\n1,2", false),
+            "pipe:3: the last line has no end; its last value may be cut off");
+  EXPECT_EQ(said("t,x\n0,1\n1,2\n", true), "");
+  EXPECT_EQ(said("t,x\n0,1\n1,2\n\n  ", false), "");
+}
+
+TEST(DataPipe, SaysOfAFileWithoutALastEndWhatIsFoundFirst) {
+  const TestFolder folder;
+  const std::string file = folder.Write("d.csv", "t;x\n0;1\n1;2");
+  std::string found;
+  const auto data = ReadDataFile(file, XAndForce(), StopAtRefusedLine, &found);
+  ASSERT_TRUE(data.ok()) << data.status();
+  EXPECT_EQ(data->time_s_size(), 2);
+  EXPECT_EQ(found, file + ": semicolons; 2 rows from 0 s\n" + file +
+                       ":3: the last line has no end; its last value may be cut off");
 }
 
 }  // namespace

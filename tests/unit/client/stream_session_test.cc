@@ -3,6 +3,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <utility>
+
+#include "client/cli/first_rows.h"
+
 namespace polyest::internal::stream_session_test {
 namespace {
 
@@ -50,10 +54,10 @@ TEST(RemoveRowsUpTo, TakesEarlierRunsWhole) {
   EXPECT_THAT(batch.time_s(), ElementsAre(4));
 }
 
-TEST(RemoveRowsFrom, KeepsWhatIsEarlier) {
+TEST(FirstRows, AreThoseThatAreEarlier) {
   v1::Measurements batch = Rows();
   for (const int run : {0, 0, 1, 1}) batch.add_run(run);
-  RemoveRowsFrom(2, batch);
+  batch = FirstRows(std::move(batch), 2);
   EXPECT_THAT(batch.time_s(), ElementsAre(1, 2));
   EXPECT_THAT(batch.run(), ElementsAre(0, 0));
   EXPECT_THAT(batch.channels(0).values(), ElementsAre(10, 20));

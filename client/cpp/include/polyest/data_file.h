@@ -57,6 +57,9 @@ struct DataFileOptions {
   std::string time_column;                       // header of the time; empty: found out
   bool any_order = false;                        // whether a run's rows may be in any order of time
   bool any_first_run = false;  // whether the first row's run may be another than 0
+  // Whether a last line without its end is left out: the program that wrote it may have ended in
+  // the middle of a number.
+  bool whole_lines = false;
 };
 
 // Where a quantity is in a file, as in Problem.columns. Empty fields are found out.
@@ -145,6 +148,10 @@ class DataReader {
   // and columns of the quantities' own names in the model's units only.
   std::string Found() const;
 
+  // Says, once it is read, that the last line has no end: that it is left out, with `whole_lines`,
+  // or that its last value may be cut off. Empty if there is no such line.
+  std::string UnendedLine() const;
+
   // Returns the lines of the rows read so far, for messages about a row.
   const RowLines& Lines() const;
 
@@ -158,7 +165,8 @@ class DataReader {
   std::unique_ptr<Reader> reader_;
 };
 
-// Reads a whole file. Writes Found() to `found` and Lines() to `lines` unless they are null.
+// Reads a whole file. Writes Found() and UnendedLine(), a line each, to `found` and Lines() to
+// `lines` unless they are null.
 absl::StatusOr<v1::Measurements> ReadDataFile(const std::string& path, const DataColumns& columns,
                                               RefusedLine refused = StopAtRefusedLine,
                                               std::string* found = nullptr,
