@@ -11,8 +11,8 @@
 
 #include "client/cli/backend.h"
 #include "client/cli/commands.h"
-#include "client/cli/draft_file.h"
 #include "client/cli/exit_status.h"
+#include "client/plot/draft_file.h"
 #include "core/common/check.h"
 #include "core/common/status.h"
 #include "proto/wire/check/numbers.h"
@@ -54,6 +54,7 @@ class BackupFile {
 };
 
 absl::StatusOr<v1::BackupSummary> BackUp(const BackupArguments& arguments) {
+  POLYEST_RETURN_IF_ERROR(DraftFile::Check(arguments.output_file));
   Client client(arguments.place.server, ToClientOptions(arguments.place));
   v1::BackupSummary summary;
   std::optional<std::string> sha256;

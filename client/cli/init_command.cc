@@ -2,7 +2,6 @@
 #include <absl/strings/str_join.h>
 
 #include <filesystem>
-#include <fstream>
 #include <string>
 #include <vector>
 
@@ -13,6 +12,7 @@
 #include "client/cli/starting_problem.h"
 #include "client/cli/text_table.h"
 #include "client/cpp/data/cells.h"
+#include "client/plot/output_file.h"
 #include "core/common/status.h"
 #include "polyest/catalogue.h"
 
@@ -75,10 +75,7 @@ absl::Status WriteFile(const InitArguments& arguments, const std::string& text) 
     return absl::AlreadyExistsError(
         absl::StrCat(path, ": already exists; use --force to overwrite it"));
   }
-  std::ofstream out(path, std::ios::binary | std::ios::trunc);
-  out << text;
-  if (!out.flush()) return absl::InvalidArgumentError(absl::StrCat(path, ": cannot be written"));
-  return absl::OkStatus();
+  return WriteOutputFile("--output", path, text);
 }
 
 }  // namespace

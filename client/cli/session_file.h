@@ -16,7 +16,7 @@
 #include <string>
 #include <utility>
 
-#include "client/cli/draft_file.h"
+#include "client/plot/draft_file.h"
 #include "polyest/v1/session_service.pb.h"
 
 namespace polyest::internal {

@@ -12,6 +12,7 @@ namespace polyest::internal {
 namespace {
 
 absl::StatusOr<int64_t> Export(const ExportArguments& arguments) {
+  POLYEST_RETURN_IF_ERROR(DraftFile::Check(arguments.file));
   Client client(arguments.place.server, ToClientOptions(arguments.place));
   v1::ExportSessionRequest request;
   request.set_name(absl::StrCat("sessions/", arguments.session));

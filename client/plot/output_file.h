@@ -10,11 +10,11 @@
 
 namespace polyest::internal {
 
-// Returns OK if `file` is there and may be written to, or if its folder is there and may take it;
-// changes nothing. Otherwise UNKNOWN with the option, such as "--plot", the file and the reason.
+// Returns OK if `file` may be written to, or if its folder is there and may take it; changes
+// nothing. Otherwise UNKNOWN with the option, such as "--plot", the file and the reason.
 absl::Status CheckOutputFile(absl::string_view option, const std::string& file);
 
-// Writes the whole file. Fails as CheckOutputFile.
+// Replaces the whole file, or leaves it as it is (draft_file.h). Fails as CheckOutputFile.
 absl::Status WriteOutputFile(absl::string_view option, const std::string& file,
                              absl::string_view text);
 

@@ -2,6 +2,7 @@
 
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_split.h>
 #include <spawn.h>
 #include <stdlib.h>
 #include <sys/wait.h>
@@ -22,6 +23,28 @@ namespace {
 constexpr char kConverter[] = "rsvg-convert";
 constexpr char kZoom[] = "2";  // pixels of the PNG for each of the SVG: sharp on paper, too
 
+bool IsPng(const std::string& file) { return absl::EndsWithIgnoreCase(file, ".png"); }
+
+// Returns the error of a PNG without the program that makes it.
+absl::Status NoConverter(const std::string& png, int error) {
+  return absl::InvalidArgumentError(
+      absl::StrCat("--plot ", png, ": a PNG needs the program ", kConverter, " (", strerror(error),
+                   "): sudo apt-get install librsvg2-bin, or write an .svg"));
+}
+
+// Whether a folder of the PATH has the program.
+bool HasConverter() {
+  const char* const folders = getenv("PATH");
+  for (const absl::string_view folder : absl::StrSplit(folders == nullptr ? "" : folders, ':')) {
+    const std::string program = absl::StrCat(folder.empty() ? "." : folder, "/", kConverter);
+    std::error_code unknown;
+    if (std::filesystem::is_regular_file(program, unknown) && access(program.c_str(), X_OK) == 0) {
+      return true;
+    }
+  }
+  return false;
+}
+
 // Runs rsvg-convert, without a shell.
 absl::Status Convert(std::string svg, std::string png) {
   std::string name = kConverter, zoom_option = "--zoom", zoom = kZoom, output = "--output";
@@ -29,11 +52,7 @@ absl::Status Convert(std::string svg, std::string png) {
                        png.data(),  svg.data(),         nullptr};
   pid_t process = 0;
   const int failed = posix_spawnp(&process, kConverter, nullptr, nullptr, arguments, environ);
-  if (failed != 0) {
-    return absl::FailedPreconditionError(
-        absl::StrCat("--plot ", png, ": a PNG needs the program ", kConverter, " (",
-                     strerror(failed), "): sudo apt-get install librsvg2-bin, or write an .svg"));
-  }
+  if (failed != 0) return NoConverter(png, failed);
   int state = 0;
   while (waitpid(process, &state, 0) < 0 && errno == EINTR) {
   }
@@ -61,18 +80,18 @@ absl::Status WritePng(const std::string& text, const std::string& file) {
 
 absl::Status CheckPlotFile(const std::string& file) {
   if (file.empty()) return absl::OkStatus();
-  if (!absl::EndsWithIgnoreCase(file, ".svg") && !absl::EndsWithIgnoreCase(file, ".png")) {
+  if (!absl::EndsWithIgnoreCase(file, ".svg") && !IsPng(file)) {
     return absl::InvalidArgumentError(
         absl::StrCat("--plot: \"", file, "\" must end in .svg or .png"));
   }
+  if (IsPng(file) && !HasConverter()) return NoConverter(file, ENOENT);
   return CheckOutputFile("--plot", file);
 }
 
 absl::Status WritePlot(const Plot& plot, const std::string& file) {
   POLYEST_RETURN_IF_ERROR(CheckPlotFile(file));
   const std::string text = RenderSvg(plot);
-  return absl::EndsWithIgnoreCase(file, ".png") ? WritePng(text, file)
-                                                : WriteOutputFile("--plot", file, text);
+  return IsPng(file) ? WritePng(text, file) : WriteOutputFile("--plot", file, text);
 }
 
 }  // namespace polyest::internal
