@@ -56,14 +56,6 @@ std::string DiagnosticText(v1::Diagnostic::Code code) {
   }
 }
 
-// Returns the most probable value with its standard deviation. Where the data say less than the
-// prior, that may be any value that the prior allows, and it is the posterior's mean with its own.
-std::string EstimateText(const v1::ParameterEstimate& p) {
-  const bool by_mean = p.verdict() == v1::Identifiability::NOT_IDENTIFIED;
-  return by_mean && p.posterior_std_dev() > 0 ? FormatUncertain(p.mean(), p.posterior_std_dev())
-                                              : FormatUncertain(p.map(), p.std_dev());
-}
-
 void PrintParameters(const v1::Estimate& estimate, std::ostream& out) {
   TextTable table(
       {"parameter", "estimate ± sd", "unit", "95 % interval", "prior", "sd/prior", "verdict"});
@@ -208,6 +200,13 @@ void PrintSummary(const v1::Estimate& estimate, std::ostream& out) {
 }
 
 }  // namespace
+
+std::string EstimateText(const v1::ParameterEstimate& p) {
+  // Where the data say less than the prior, the most probable value may be any that it allows.
+  const bool by_mean = p.verdict() == v1::Identifiability::NOT_IDENTIFIED;
+  return by_mean && p.posterior_std_dev() > 0 ? FormatUncertain(p.mean(), p.posterior_std_dev())
+                                              : FormatUncertain(p.map(), p.std_dev());
+}
 
 std::string VerdictText(v1::Identifiability::Verdict verdict) {
   switch (verdict) {

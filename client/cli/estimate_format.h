@@ -15,6 +15,11 @@ namespace polyest::internal {
 // Prints a whole estimate: parameters, channels, directions, cost, expansion, diagnostics.
 void PrintEstimate(const v1::Estimate& estimate, std::ostream& out);
 
+// Returns a parameter's estimate with its standard deviation, "40.6612 ± 0.0052", in the
+// parameter's unit: the most probable value, or the posterior's mean with the posterior's own
+// standard deviation for a parameter that is not identified. Whatever shows an estimate shows this.
+std::string EstimateText(const v1::ParameterEstimate& p);
+
 // Returns one line: "t = 10 s  k = 40.661 ± 0.026 N/m  c = 0.203 ± 0.011 N s/m".
 std::string EstimateLine(const v1::Estimate& estimate);
 

@@ -32,7 +32,7 @@ constexpr int kMaxTimes = 400;
 // Returns a sentence about the information that the data give about one parameter.
 std::string Describe(const v1::ParameterEstimate& p, std::ostream& out) {
   const std::string unit = p.unit().empty() || p.unit() == "1" ? "" : " " + p.unit();
-  const std::string value = FormatUncertain(p.map(), p.std_dev()) + unit;
+  const std::string value = EstimateText(p) + unit;
   const std::string verdict = PaintVerdict(
       out, p.verdict(),
       p.verdict() == v1::Identifiability::WEAK ? "weakly identified" : VerdictText(p.verdict()));
@@ -50,9 +50,9 @@ std::string Describe(const v1::ParameterEstimate& p, std::ostream& out) {
                              verdict, value, FormatUncertain(p.prior_mean(), p.prior_std_dev()),
                              unit);
     default:
-      return absl::StrFormat(
-          "%s is %s: the data add almost nothing; the estimate is essentially your prior, %s%s.",
-          p.name(), verdict, FormatUncertain(p.prior_mean(), p.prior_std_dev()), unit);
+      return absl::StrFormat("%s is %s: %s; the data add almost nothing to your prior, %s%s.",
+                             p.name(), verdict, value,
+                             FormatUncertain(p.prior_mean(), p.prior_std_dev()), unit);
   }
 }
 
@@ -89,6 +89,11 @@ v1::Problem WithoutStreamedInputs(v1::Problem problem, const v1::Measurements& m
     }
     for (const v1::Measurements::Channel& channel : measurements.channels()) {
       if (channel.name() == input.name()) AddKnots(measurements, channel, rows, table);
+    }
+    if (table.time_s().empty()) {
+      // An input without any sample in a run is 0 there.
+      table.add_time_s(0);
+      table.add_value(0);
     }
   }
   return problem;

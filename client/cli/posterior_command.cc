@@ -72,8 +72,13 @@ std::string Sketch(const google::protobuf::RepeatedField<double>& density) {
   return text;
 }
 
+// Whether there are Markov chains, which alone have an R̂.
+bool HasChains(const v1::ComputePosteriorResponse& posterior) {
+  return posterior.method() == v1::ComputePosteriorResponse::MARKOV_CHAINS;
+}
+
 void PrintTable(const v1::ComputePosteriorResponse& posterior, std::ostream& out) {
-  const bool chains = posterior.method() == v1::ComputePosteriorResponse::MARKOV_CHAINS;
+  const bool chains = HasChains(posterior);
   std::vector<std::string> header = {"parameter", "mean ± sd", "unit"};
   for (const double probability : posterior.probabilities()) {
     header.push_back(FormatPercent(probability));
@@ -132,8 +137,9 @@ void PrintParameters(const v1::ComputePosteriorResponse& posterior, std::ostream
     out << CsvField(parameter.name()) << ',' << FormatExact(parameter.mean()) << ','
         << FormatExact(parameter.std_dev());
     for (const double quantile : parameter.quantiles()) out << ',' << FormatExact(quantile);
-    out << ',' << FormatExact(parameter.effective_sample_size()) << ','
-        << FormatExact(parameter.r_hat()) << '\n';
+    out << ',' << FormatExact(parameter.effective_sample_size()) << ',';
+    if (HasChains(posterior)) out << FormatExact(parameter.r_hat());
+    out << '\n';
   }
 }
 

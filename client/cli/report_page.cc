@@ -70,7 +70,7 @@ std::string Parameters(const v1::Estimate& estimate) {
   std::vector<std::vector<std::string>> rows;
   std::vector<std::string> classes;
   for (const v1::ParameterEstimate& p : estimate.parameters()) {
-    rows.push_back({p.name(), FormatUncertain(p.mean(), p.std_dev()), UnitText(p.unit()),
+    rows.push_back({p.name(), EstimateText(p), UnitText(p.unit()),
                     FormatInterval(p.lower95(), p.upper95(), p.std_dev()),
                     FormatUncertain(p.prior_mean(), p.prior_std_dev()), VerdictText(p.verdict())});
     classes.push_back(v1::Identifiability::Verdict_Name(p.verdict()));
@@ -107,6 +107,10 @@ std::string Scores(const v1::PredictResponse& prediction) {
   for (const auto& output : prediction.outputs()) {
     if (!output.has_score()) continue;
     const auto& score = output.score();
+    if (score.sample_count() == 0) {
+      rows.push_back({output.output(), UnitText(output.unit()), "0", "-", "-", "-"});
+      continue;
+    }
     rows.push_back({output.output(), UnitText(output.unit()), absl::StrCat(score.sample_count()),
                     FormatNumber(score.root_mean_square()), FormatPercent(score.coverage95()),
                     FormatNumber(score.log_score())});
@@ -119,6 +123,10 @@ std::string Scores(const v1::PredictResponse& prediction) {
 std::string Channels(const v1::Estimate& estimate) {
   std::vector<std::vector<std::string>> rows;
   for (const v1::ChannelEstimate& c : estimate.channels()) {
+    if (c.samples() == 0) {
+      rows.push_back({c.output(), "0", "-", "-", "-", "-", "-"});
+      continue;
+    }
     rows.push_back({c.output(), absl::StrCat(c.samples()), FormatNumber(c.noise_std_dev()),
                     FormatNumber(c.chi_squared()), FormatNumber(c.lag1_correlation(), 2),
                     FormatNumber(c.effective_samples(), 3), absl::StrCat(c.outliers())});

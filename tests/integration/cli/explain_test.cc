@@ -108,6 +108,26 @@ TEST_F(ExplainTest, NamesTheOutputToAddWhereTheInputIsStreamed) {
                     HasSubstr(" would determine theta to ±")));
 }
 
+// The input is 0 in the first run, where it has no sample.
+TEST_F(ExplainTest, ProposesWhereAnInputHasNoSamplesInTheFirstRun) {
+  const std::string problem = File("problem.json", R"({
+    "model": {"builtin": "mass_spring_damper"}, "fixed": {"x0": 1},
+    "uncertain": [{"name": "k", "normal": {"mean": 39.5, "stdDev": 2}},
+                  {"name": "m", "normal": {"mean": 1, "stdDev": 0.05}}],
+    "inputs": [{"name": "force", "streamed": {}}],
+    "measured": [{"output": "x", "noise": {"absolute": 0.5}}]
+  })");
+  const std::string data = File("data.csv",
+                                "t,run,x,force\n0.1,0,0.8,\n0.2,0,0.3,\n0.3,0,-0.3,\n"
+                                "0.1,1,0.8,0\n0.2,1,0.3,0\n0.3,1,-0.3,0\n");
+  ASSERT_EQ(Run({"estimate", problem, data}).exit_status, 0);
+  const Finished run = Run({"explain", problem, data, "--no-remedies"});
+  EXPECT_EQ(run.exit_status, 0) << run.err;
+  EXPECT_THAT(run.out, AllOf(HasSubstr("m is not identified: "),
+                             HasSubstr("the data add almost nothing to your prior, 1.000 ± 0.050"),
+                             HasSubstr("No other output of the model would identify m")));
+}
+
 TEST_F(ExplainTest, SpeaksOfTheParametersOfEachRun) {
   const std::string problem = File("problem.json", R"({
     "model": {"builtin": "mass_spring_damper"},

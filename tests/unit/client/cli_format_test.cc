@@ -147,6 +147,18 @@ TEST(PrintEstimate, SaysInWordsWhatIsKnown) {
   EXPECT_THAT(text, Not(HasSubstr("nan")));
 }
 
+TEST(EstimateText, IsThePosteriorsMeanWhereTheDataTellLessThanThePrior) {
+  v1::ParameterEstimate p;
+  p.set_map(0.15);
+  p.set_std_dev(0.5);
+  p.set_mean(0.29);
+  p.set_posterior_std_dev(0.44);
+  p.set_verdict(v1::Identifiability::WEAK);
+  EXPECT_EQ(EstimateText(p), "0.15 ± 0.50");
+  p.set_verdict(v1::Identifiability::NOT_IDENTIFIED);
+  EXPECT_EQ(EstimateText(p), "0.29 ± 0.44");
+}
+
 TEST(PrintEstimate, DividesByNoSamples) {
   v1::Estimate estimate = ExampleEstimate();
   estimate.mutable_channels(0)->set_samples(0);

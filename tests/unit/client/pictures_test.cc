@@ -94,6 +94,30 @@ TEST_F(PicturesTest, RefuseAnotherKindOfFileBeforeAnythingIsComputed) {
                             ": No such file or directory\n");
 }
 
+// The problem is not there either: the program is looked for first.
+TEST_F(PicturesTest, MissTheProgramOfAPngBeforeAnythingIsRead) {
+  const std::string path = getenv("PATH");
+  setenv("PATH", (folder_ / "no").c_str(), 1);
+  EstimateArguments arguments;
+  arguments.problem_file = "no.json";
+  arguments.plot_file = folder_ / "plot.png";
+  std::ostringstream out, err;
+  EXPECT_EQ(RunCommand(arguments, out, err), 2);
+  setenv("PATH", path.c_str(), 1);
+  EXPECT_THAT(err.str(), HasSubstr("a PNG needs the program rsvg-convert (No such file"));
+  EXPECT_FALSE(std::filesystem::exists(arguments.plot_file));
+}
+
+// Importance sampling has no chains.
+TEST_F(PicturesTest, PosteriorsWithoutChainsHaveNoRHat) {
+  auto arguments = OfOscillator<PosteriorArguments>();
+  arguments.format = Format::kCsv;
+  std::ostringstream out, err;
+  ASSERT_EQ(RunCommand(arguments, out, err), 0) << err.str();
+  EXPECT_THAT(out.str(), HasSubstr("effectiveSampleSize,rHat\n"));
+  EXPECT_TRUE(std::regex_search(out.str(), std::regex("\nk,[^\n]*[0-9],\n"))) << out.str();
+}
+
 // Of the same record as the estimate's, the score of the validation is that of the fit.
 TEST_F(PicturesTest, FitScoresAnotherRecord) {
   auto arguments = OfOscillator<FitArguments>();
@@ -126,18 +150,35 @@ TEST_F(PicturesTest, ReportIsOnePageWithAllThatSupportsTheEstimate) {
   EXPECT_THAT(page, Not(HasSubstr("<script")));
 }
 
+TEST(ReportPage, ShowsNoScoresWithoutSamples) {
+  ReportContent content;
+  content.estimate.add_channels()->set_output("x");
+  v1::PredictResponse::Output& output = *content.prediction.add_outputs();
+  output.set_output("x");
+  output.mutable_score();
+  const std::string page = ReportPage(content);
+  EXPECT_THAT(page, HasSubstr("<tr><td>x</td><td></td><td>0</td><td>-</td><td>-</td><td>-</td>"));
+  EXPECT_THAT(page, HasSubstr("<tr><td>x</td><td>0</td><td>-</td>"));
+  EXPECT_THAT(page, Not(HasSubstr(">0 %")));
+}
+
 TEST(ReportPage, ShowsTextsOfUsersAsTextAndWarnings) {
   ReportContent content;
   content.subject = "<b>rig</b> & co";
   v1::ParameterEstimate& k = *content.estimate.add_parameters();
   k.set_name("<k>");
   k.set_verdict(v1::Identifiability::NOT_IDENTIFIED);
+  k.set_map(0.15);
+  k.set_std_dev(0.5);
+  k.set_mean(0.29);
+  k.set_posterior_std_dev(0.44);
   v1::Diagnostic& diagnostic = *content.estimate.add_diagnostics();
   diagnostic.set_code(v1::Diagnostic::MODEL_MISFIT);
   diagnostic.set_message("residuals > noise");
   const std::string page = ReportPage(content);
   EXPECT_THAT(page, HasSubstr("&lt;b&gt;rig&lt;/b&gt; &amp; co"));
   EXPECT_THAT(page, HasSubstr("&lt;k&gt;"));
+  EXPECT_THAT(page, HasSubstr("<td>0.29 ± 0.44</td>"));
   EXPECT_THAT(page, HasSubstr("model misfit: residuals &gt; noise"));
   EXPECT_THAT(page, HasSubstr("class=\"verdict NOT_IDENTIFIED\""));
   EXPECT_THAT(page, Not(HasSubstr("No warnings")));
