@@ -171,10 +171,22 @@ void PrintTables(const Design& design, std::ostream& out) {
   PrintDiagnostics(best.diagnostics(), out);
 }
 
+// Says that there are fewer possible sample times than are to be chosen.
+void TellOfFewerTimes(const Design& design, const DesignArguments& arguments, std::ostream& err) {
+  const int chosen = design.candidates(0).samples_size();
+  if (chosen >= arguments.samples) return;
+  err << absl::StrFormat(
+      "polyest: --samples: there are only %d possible sample times, all of which are chosen; a "
+      "smaller --step allows more\n",
+      chosen);
+}
+
 }  // namespace
 
 int RunCommand(const DesignArguments& arguments, std::ostream& out, std::ostream& err) {
-  return PrintAnswer(DesignExperiment(arguments), arguments, PrintTables, nullptr, out, err);
+  const absl::StatusOr<Design> design = DesignExperiment(arguments);
+  if (design.ok()) TellOfFewerTimes(*design, arguments, err);
+  return PrintAnswer(design, arguments, PrintTables, nullptr, out, err);
 }
 
 }  // namespace polyest::internal

@@ -73,7 +73,8 @@ void AddPosterior(CommandRegistry& registry) {
   command
       .add_option("--quantiles", arguments->probabilities,
                   "Probabilities of the quantiles, P,P,… (default 0.025,0.5,0.975)")
-      ->delimiter(',');
+      ->delimiter(',')
+      ->allow_extra_args(false);
   command
       .add_option("--joint", arguments->joints,
                   "Two parameters whose joint density is wanted, NAME,NAME; may be repeated;\n"
@@ -119,7 +120,7 @@ void AddFit(CommandRegistry& registry) {
            "better."},
       arguments);
   AddStudyInput(command, *arguments);
-  command.add_option("--validate", arguments->validation_file,
+  command.add_option(kValidate, arguments->validation_file,
                      "Predict and score this CSV file, whose samples are not used to estimate");
   AddOutputs(command, arguments->outputs,
              "Outputs to predict, and parameters that drift, comma-separated (default: the\n"
@@ -127,7 +128,8 @@ void AddFit(CommandRegistry& registry) {
   command
       .add_option("--quantiles", arguments->probabilities,
                   "Probabilities of the quantiles, P,P,… (default 0.025,0.5,0.975)")
-      ->delimiter(',');
+      ->delimiter(',')
+      ->allow_extra_args(false);
   command.add_option("--draws", arguments->draws, "Trajectories of the model (default 400)")
       ->check(WholeBetween(2, 10'000));
   command.add_option("--rows", arguments->rows, "The most rows to print (default 2000)")
@@ -206,6 +208,7 @@ void AddProfile(CommandRegistry& registry) {
       .add_option("--parameter", arguments->parameters,
                   "A parameter to profile; may be repeated (default: all)")
       ->expected(1)
+      ->allow_extra_args(false)
       ->take_all();
   command.add_option("--points", arguments->points, "Values of each parameter (default 41)")
       ->check(WholeBetween(3, 1'001));
@@ -227,6 +230,7 @@ void AddCost(CommandRegistry& registry) {
       .add_option("--parameter", arguments->parameters,
                   "A parameter to vary, at most two (default: the first two)")
       ->expected(1)
+      ->allow_extra_args(false)
       ->take_all();
   command
       .add_option("--grid", arguments->grid_points,

@@ -17,7 +17,12 @@
 
 namespace {
 
-int Run(const polyest::internal::Command& command) {
+// Runs the command, or returns the exit status after help, version or an error have been printed.
+int Run(const std::variant<polyest::internal::CommandLine, int>& parsed) {
+  if (const int* status = std::get_if<int>(&parsed)) return *status;
+  const auto& line = std::get<polyest::internal::CommandLine>(parsed);
+  polyest::internal::SetScreen(std::cout, polyest::internal::ScreenOf(STDOUT_FILENO, line.color));
+  polyest::internal::SetScreen(std::cerr, polyest::internal::ScreenOf(STDERR_FILENO, line.color));
   return std::visit(
       [](const auto& arguments) {
         if constexpr (std::is_same_v<std::decay_t<decltype(arguments)>,
@@ -27,7 +32,7 @@ int Run(const polyest::internal::Command& command) {
           return polyest::internal::RunCommand(arguments, std::cout, std::cerr);
         }
       },
-      command);
+      line.command);
 }
 
 }  // namespace
@@ -37,12 +42,7 @@ int main(int argc, char** argv) {
   gpr_set_log_function([](gpr_log_func_args*) {});
   google::protobuf::SetLogHandler(nullptr);
   try {
-    const auto parsed = polyest::internal::ParseArguments(argc, argv, std::cout, std::cerr);
-    if (const int* status = std::get_if<int>(&parsed)) return *status;
-    const auto& line = std::get<polyest::internal::CommandLine>(parsed);
-    polyest::internal::SetScreen(std::cout, polyest::internal::ScreenOf(STDOUT_FILENO, line.color));
-    polyest::internal::SetScreen(std::cerr, polyest::internal::ScreenOf(STDERR_FILENO, line.color));
-    const int status = Run(line.command);
+    const int status = Run(polyest::internal::ParseArguments(argc, argv, std::cout, std::cerr));
     std::cout.flush();
     if (status == polyest::internal::kExitOk && !std::cout) {
       std::cerr << "polyest: the output could not be written" << std::endl;

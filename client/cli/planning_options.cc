@@ -14,6 +14,8 @@
 namespace polyest::internal {
 namespace {
 
+constexpr char kUntilHelp[] = "No time is later, s; the last one is a multiple of --step";
+
 void AddModels(CommandRegistry& registry) {
   const auto arguments = std::make_shared<ModelsArguments>();
   CLI::App& command = registry.Add({.name = "models",
@@ -38,11 +40,13 @@ void AddInit(CommandRegistry& registry) {
   CLI::Option* const equations =
       command.add_flag("--equations", arguments->equations, "With a model given by its equations")
           ->excludes(model);
-  command
-      .add_option("--from", arguments->data_file,
-                  "A CSV file: the problem measures its columns, with noise of unknown size")
-      ->excludes(equations);
-  AddDataOptions(command, arguments->data_options);
+  CLI::Option* const data =
+      command
+          .add_option("--from", arguments->data_file,
+                      "A CSV file: the problem measures its columns, with noise of unknown size")
+          ->excludes(equations);
+  const auto of_data = AddDataOptions(command, arguments->data_options);
+  command.callback([of_data, data] { RequireDataFile(of_data, {data}); });
   command.add_option("-o,--output", arguments->output_file, "The file (default: standard output)");
   command.add_flag("--force", arguments->force, "Overwrite the file if it is there");
   AddModelFolders(command, arguments->place);
@@ -56,8 +60,10 @@ void AddCheck(CommandRegistry& registry) {
                     .examples = {"check problem.json", "check problem.json data.csv"}},
                    arguments);
   AddProblem(command, arguments->problem_file);
-  command.add_option("data", arguments->data_file, "The measurements, a CSV file");
-  AddDataOptions(command, arguments->data_options);
+  const CLI::Option* const data =
+      command.add_option("data", arguments->data_file, "The measurements, a CSV file");
+  const auto of_data = AddDataOptions(command, arguments->data_options);
+  command.callback([of_data, data] { RequireDataFile(of_data, {data}); });
   AddModelFolders(command, arguments->place);
   AddFormat(command, arguments->format, {"table", "json"});
 }
@@ -79,7 +85,7 @@ void AddPropagate(CommandRegistry& registry) {
                     "propagate problem.json --until 10 --step 0.01 --format csv > band.csv"}},
       arguments);
   AddProblem(command, arguments->problem_file);
-  command.add_option("--until", arguments->until_s, "The last time, s")->required();
+  command.add_option("--until", arguments->until_s, kUntilHelp)->required();
   command.add_option("--step", arguments->step_s, "Time step, s")->required();
   AddPriorDraws(command, arguments->draws);
   AddPlace(command, arguments->place);
@@ -94,7 +100,7 @@ void AddSensitivity(CommandRegistry& registry) {
                     .examples = {"sensitivity problem.json --until 10"}},
                    arguments);
   AddProblem(command, arguments->problem_file);
-  command.add_option("--until", arguments->until_s, "The last time, s")->required();
+  command.add_option("--until", arguments->until_s, kUntilHelp)->required();
   command.add_option("--step", arguments->step_s, "Time step, s (default: a hundredth of --until)");
   AddPriorDraws(command, arguments->draws);
   AddOutputs(command, arguments->outputs, "The outputs, comma-separated (default: measured)");
@@ -112,9 +118,11 @@ void AddDesign(CommandRegistry& registry) {
                                  "design problem.json data.csv --until 10 --candidate chirp.json"}},
                    arguments);
   AddProblem(command, arguments->problem_file);
-  command.add_option("data", arguments->data_file, "What has been measured so far, a CSV file");
-  AddDataOptions(command, arguments->data_options);
-  command.add_option("--until", arguments->until_s, "The last possible sample time, s")->required();
+  const CLI::Option* const data =
+      command.add_option("data", arguments->data_file, "What has been measured so far, a CSV file");
+  const auto of_data = AddDataOptions(command, arguments->data_options);
+  command.callback([of_data, data] { RequireDataFile(of_data, {data}); });
+  command.add_option("--until", arguments->until_s, kUntilHelp)->required();
   command.add_option("--step", arguments->step_s,
                      "Step between possible sample times, s (default: a hundredth of --until)");
   command.add_option("--samples", arguments->samples, "Sample times to choose (default: 10)")
@@ -123,6 +131,7 @@ void AddDesign(CommandRegistry& registry) {
       .add_option("--candidate", arguments->candidate_files,
                   "A problem file whose inputs are another candidate")
       ->expected(1)
+      ->allow_extra_args(false)
       ->take_all();
   AddOutputs(command, arguments->outputs,
              "Further outputs that could be measured, comma-separated (default: all)");

@@ -108,9 +108,11 @@ std::vector<CLI::Option*> AddModelFolders(CLI::App& command, Place& place) {
 }
 
 CLI::Option* AddThreads(CLI::App& command, int& threads) {
-  return command.add_option("--threads", threads, "Threads for computing in this process")
-      ->check(WholeBetween(1, 256))
-      ->capture_default_str();
+  // The help has no number of its own: man pages are made of it, on another computer.
+  return command
+      .add_option("--threads", threads,
+                  "Threads for computing in this process (default: one for each core)")
+      ->check(WholeBetween(1, 256));
 }
 
 CLI::Option* AddPlace(CLI::App& command, Place& place) {
@@ -144,12 +146,16 @@ void AddStudyInput(CLI::App& command, StudyInput& input) {
           ->needs(server)
           ->excludes(problem)
           ->excludes(data);
-  command.callback([problem, data, name] {
-    if (name->count() > 0 || data->count() > 0) return;
-    throw CLI::RequiredError(problem->count() > 0 ? "data"
-                                                  : "problem and data, or else --session,");
+  const std::vector<CLI::Option*> of_data = AddDataOptions(command, input.data_options);
+  command.callback([&command, problem, data, name, of_data] {
+    if (name->count() == 0 && data->count() == 0) {
+      throw CLI::RequiredError(problem->count() > 0 ? "data"
+                                                    : "problem and data, or else --session,");
+    }
+    std::vector<const CLI::Option*> files = {data};
+    if (const auto* const other = command.get_option_no_throw(kValidate)) files.push_back(other);
+    RequireDataFile(of_data, files);
   });
-  AddDataOptions(command, input.data_options);
 }
 
 void AddOutputs(CLI::App& command, std::vector<std::string>& outputs, const char* help) {

@@ -27,8 +27,14 @@ CLI::Option* AddPlace(CLI::App& command, Place& place);
 void AddProblem(CLI::App& command, std::string& file);
 void AddData(CLI::App& command, std::string& file);
 // Adds what can be said about a data file: --delimiter, --decimal, --time-column, --time-zero and
-// --date-order.
-void AddDataOptions(CLI::App& command, DataFileOptions& options);
+// --date-order. Returns them.
+std::vector<CLI::Option*> AddDataOptions(CLI::App& command, DataFileOptions& options);
+// Throws CLI::RequiresError if one of these options about a data file is given but none of the
+// options that name such a file.
+void RequireDataFile(const std::vector<CLI::Option*>& options,
+                     const std::vector<const CLI::Option*>& files);
+// The option of a command that names a data file beside those of AddStudyInput.
+inline constexpr char kValidate[] = "--validate";
 // Adds problem and data files, or --session in their place, for a study of an estimate.
 void AddStudyInput(CLI::App& command, StudyInput& input);
 // Adds --outputs, a comma-separated list, with a help that begins with `help`.

@@ -13,18 +13,19 @@ _polyest_options() { # HELP
 }
 
 # The words that it lists for one option: "--log-format TEXT:{text,json}", or in its description
-# "How to print: table, json (default table)".
+# "How to print: table, json (default table)" or "The decimal mark: comma, point".
 _polyest_words() { # HELP OPTION
   awk -v option="$2" '
     /^ *-/ { inside = match($0, /--[a-z0-9-]+/) && substr($0, RSTART, RLENGTH) == option }
     /^[^ ]/ { inside = 0 }
     inside { text = text " " $0 }
     END {
+      gsub(/ +/, " ", text)
       if (match(text, /[{][^}]*[}]/)) words = substr(text, RSTART + 1, RLENGTH - 2)
-      else if (match(text, /: [a-z0-9-]+(, [a-z0-9-]+)+ [(]/)) {
-        words = substr(text, RSTART + 2, RLENGTH - 3)
+      else if (match(text, /: [a-z0-9-]+(, [a-z0-9-]+)+( [(]| ?$)/)) {
+        words = substr(text, RSTART + 2, RLENGTH - 2)
       }
-      gsub(",", " ", words)
+      gsub(/[,(]/, " ", words)
       print words
     }' <<<"$1"
 }

@@ -52,6 +52,7 @@ check_completion() {
   expect "completion of commands" " $(complete_words polyest es) " " estimate "
   expect "completion of options" " $(complete_words polyest estimate --fo) " " --format "
   expect "completion of an option's words" " $(complete_words polyest estimate --format j) " " json "
+  expect "completion of a data file's words" " $(complete_words polyest estimate --decimal p) " " point "
   expect "completion of the daemon" " $(complete_words polyestd --lis) " " --listen "
 }
 

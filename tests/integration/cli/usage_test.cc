@@ -2,6 +2,8 @@
 
 #include <gmock/gmock.h>
 
+#include <regex>
+
 #include "tests/integration/cli/command_test.h"
 
 namespace polyest::internal {
@@ -75,6 +77,87 @@ TEST_F(UsageTest, SaysWhatANumberMustBe) {
               HasSubstr("--quantiles: half must be a number; see"));
   EXPECT_THAT(refused("estimate", "--deadline", "nan"),
               HasSubstr("--deadline: nan must be a number from 0 to 1e+09; see"));
+}
+
+TEST_F(UsageTest, RefusesWhatIsSaidOfNoDataFile) {
+  const std::vector<std::string> session = {"--session", "s", "--server", "rig:50051"};
+  const auto refused = [](std::vector<std::string> arguments,
+                          const std::vector<std::string>& more) {
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return Refused(arguments);
+  };
+  EXPECT_EQ(refused({"report", "--time-column", "T"}, session),
+            "polyest: report: --time-column requires data; see polyest report --help\n");
+  EXPECT_THAT(refused({"fit", "--time-zero", "first"}, session),
+              HasSubstr("--time-zero requires data or --validate; see"));
+  EXPECT_THAT(Refused({"design", "p.json", "--until", "1", "--delimiter", "tab"}),
+              HasSubstr("--delimiter requires data; see"));
+  EXPECT_THAT(Refused({"check", "p.json", "--decimal", "comma"}),
+              HasSubstr("--decimal requires data; see"));
+  EXPECT_THAT(Refused({"init", "duffing", "--date-order", "dmy"}),
+              HasSubstr("--date-order requires --from; see"));
+  // The other record may need it.
+  const Finished unreachable = Run({"fit", "--validate", "d.csv", "--time-zero", "first",
+                                    "--session", "s", "--server", "127.0.0.1:1"});
+  EXPECT_EQ(unreachable.exit_status, 3) << unreachable.err;
+}
+
+TEST_F(UsageTest, TakesNoFileForAFurtherQuantile) {
+  for (const std::vector<std::string>& options : std::vector<std::vector<std::string>>{
+           {"posterior", "--quantiles", "0.5"},
+           {"posterior", "--quantiles", "0.5,0.9", "--quantiles", "0.1"},
+           {"posterior", "--joint", "k,c"},
+           {"fit", "--outputs", "x"},
+           {"fit", "--quantiles", "0.5"},
+           {"profile", "--parameter", "k"},
+           {"cost", "--parameter", "k"}}) {
+    std::vector<std::string> arguments = options;
+    arguments.insert(arguments.end(), {"no.json", "no.csv"});
+    EXPECT_THAT(Refused(arguments), HasSubstr("no.json: cannot be opened")) << options[1];
+  }
+  EXPECT_THAT(Refused({"design", "--until", "1", "--candidate", "other.json", "no.json"}),
+              HasSubstr("no.json: cannot be opened"));
+}
+
+TEST_F(UsageTest, SaysThatThereAreFewerTimesThanToBeChosen) {
+  const Finished run = Run(
+      {"design", Example("oscillator.json"), "--until", "1", "--step", "0.25", "--samples", "9"});
+  EXPECT_EQ(run.exit_status, 0);
+  EXPECT_EQ(
+      run.err,
+      "polyest: --samples: there are only 4 possible sample times, all of which are chosen; a "
+      "smaller --step allows more\n");
+}
+
+TEST_F(UsageTest, SaysThatTheHelpCouldNotBeWritten) {
+  for (const char* const words : {"--help", "--version", "estimate --help"}) {
+    const Finished run =
+        RunProgram({"/bin/sh", "-c", std::string(POLYEST_PROGRAM) + " " + words + " >/dev/full"});
+    EXPECT_EQ(run.exit_status, 1) << words;
+    EXPECT_EQ(run.err, "polyest: the output could not be written\n");
+  }
+}
+
+// What the help says becomes man pages, which serve other computers.
+TEST_F(UsageTest, SaysNothingOfThisComputerInItsHelp) {
+  EXPECT_THAT(Run({"estimate", "--help"}).out, HasSubstr("(default: one for each core)"));
+  EXPECT_FALSE(std::regex_search(Run({"estimate", "--help"}).out, std::regex("--threads[^\n]*=")));
+}
+
+TEST_F(UsageTest, CompletesTheWordsOfEveryOption) {
+  const auto completed = [](const std::string& option) {
+    const std::string words = "source " POLYEST_SOURCE_DIR
+                              "/deploy/completion/polyest.bash; COMP_WORDS=(" POLYEST_PROGRAM
+                              " estimate " +
+                              option + " ''); COMP_CWORD=3; _polyest; echo \"${COMPREPLY[*]}\"";
+    return RunProgram({"/bin/bash", "-c", words}).out;
+  };
+  EXPECT_EQ(completed("--format"), "table json\n");
+  EXPECT_EQ(completed("--delimiter"), "bar comma semicolon tab\n");
+  EXPECT_EQ(completed("--decimal"), "comma point\n");
+  EXPECT_EQ(completed("--time-zero"), "file first\n");
+  EXPECT_EQ(completed("--date-order"), "dmy mdy\n");
+  EXPECT_EQ(completed("--threads"), "\n");
 }
 
 TEST_F(UsageTest, RefusesThreadsOfThisProcessForADaemon) {
