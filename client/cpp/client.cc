@@ -1,5 +1,7 @@
 #include "polyest/client.h"
 
+#include <absl/strings/str_cat.h>
+#include <absl/strings/strip.h>
 #include <google/protobuf/util/time_util.h>
 #include <grpc/support/time.h>
 #include <grpcpp/support/error_details.h>
@@ -75,9 +77,15 @@ absl::Status FromGrpc(const grpc::Status& status) {
   if (status.ok() || !grpc::ExtractErrorDetails(status, &detailed).ok()) {
     return absl::Status(code, status.error_message());
   }
-  const std::string field = RefusedField(detailed);
-  // The daemon's message already begins with the field if users are to see it.
-  if (!field.empty()) return NamedInWords(field, absl::Status(code, status.error_message()));
+  if (const FieldPath field(RefusedField(detailed)); !field.empty()) {
+    const std::string message = status.error_message();
+    absl::string_view sentence = message;
+    // The daemon's message begins with the field if users are to see it.
+    if (absl::ConsumePrefix(&sentence, absl::StrCat(field.ToString(), ": "))) {
+      return FieldError(code, field, sentence);
+    }
+    return NamedInWords(field, absl::Status(code, sentence));
+  }
   const Refusal refusal = RefusalIn(detailed);
   if (refusal.reason.empty()) return absl::Status(code, status.error_message());
   return Refuse(code, status.error_message(), refusal);

@@ -11,7 +11,9 @@
 #include <optional>
 
 #include "core/common/check.h"
+#include "core/common/field_error.h"
 #include "polyest/client.h"
+#include "polyest/rpc/error_details.pb.h"
 #include "tests/testing/test_folder.h"
 
 namespace polyest::internal::connection_test {
@@ -130,6 +132,29 @@ TEST(Client, GivesUpEveryKindOfCallAtTheDeadline) {
   EXPECT_TRUE(absl::IsDeadlineExceeded(
       client.ExportSession({}, [](const v1::SessionRecord&) { return absl::OkStatus(); })));
   EXPECT_TRUE(absl::IsDeadlineExceeded(client.ImportSession("rig", records).status()));
+}
+
+// Returns the status of a call as gRPC gives it when a daemon refuses a field.
+absl::Status RefusedByDaemon(const std::string& field, const std::string& message) {
+  rpc::BadRequest violations;
+  violations.add_field_violations()->set_field(field);
+  rpc::Status detailed;
+  detailed.set_code(grpc::StatusCode::INVALID_ARGUMENT);
+  detailed.set_message(message);
+  auto& detail = *detailed.add_details();
+  detail.set_type_url("type.googleapis.com/google.rpc.BadRequest");
+  detail.set_value(violations.SerializeAsString());
+  return FromGrpc({grpc::StatusCode::INVALID_ARGUMENT, message, detailed.SerializeAsString()});
+}
+
+TEST(FromGrpc, TellsTheFieldFromTheSentence) {
+  const absl::Status shown = RefusedByDaemon("sessionId", "sessionId: \"A\" must be short");
+  EXPECT_EQ(shown.message(), "sessionId: \"A\" must be short");
+  EXPECT_EQ(SentenceOf(shown), "\"A\" must be short");
+  EXPECT_EQ(FieldOf(shown)->ToString(), "sessionId");
+  const absl::Status in_words = RefusedByDaemon("measurements.timeS[1]", "row 1: 1 after 2");
+  EXPECT_EQ(in_words.message(), "row 1: 1 after 2");
+  EXPECT_EQ(FieldOf(in_words)->ToString(), "measurements.timeS[1]");
 }
 
 }  // namespace
