@@ -32,9 +32,9 @@ start() {
   echo $! >>"$cluster/processes"
 }
 
-# Waits until a file has a line, at most 30 s: await FILE PATTERN
+# Waits until a command succeeds, at most 30 s: await COMMAND …
 await() {
-  timeout 30 sh -c 'until grep -q "$1" "$0"; do sleep 0.1; done' "$1" "$2"
+  timeout 30 sh -c 'until "$@" >/dev/null 2>&1; do sleep 0.1; done' await "$@"
 }
 
 # The servers of PostgreSQL, each in a folder with its socket.
@@ -73,18 +73,18 @@ END
 for node in 1 2 3; do
   start "node$node" "$polyestd" --listen 127.0.0.1:0 --journal "$database" \
     --node-secret "$cluster/node.secret"
-  await "$cluster/node$node.out" "listening on"
+  await grep -q "listening on" "$cluster/node$node.out"
   address=$(sed -n 's/^listening on //p' "$cluster/node$node.out")
   echo "  server node$node $address check inter 500ms" >>"$cluster/haproxy.cfg"
 done
 start haproxy haproxy -db -f "$cluster/haproxy.cfg"
-until "$polyest" nodes --server "127.0.0.1:$port" >/dev/null 2>&1; do sleep 0.1; done
+await "$polyest" nodes --server "127.0.0.1:$port"
 
 # The rigs, whose recording of 50 s takes five minutes.
 for rig in 1 2 3 4 5 6 7 8 9 10; do
   start "rig$rig" "$polyest" stream "$examples/oscillator.json" "$examples/oscillator.csv" \
     --server "127.0.0.1:$port" --session "rig-$rig" --rate 0.16 --batch 5 --format jsonl
 done
-for rig in 1 2 3 4 5 6 7 8 9 10; do await "$cluster/rig$rig.out" parameters; done
+for rig in 1 2 3 4 5 6 7 8 9 10; do await grep -q parameters "$cluster/rig$rig.out"; done
 
 "$polyest" nodes --server "127.0.0.1:$port"
