@@ -44,8 +44,8 @@ ExitStatus ExitStatusOf(const absl::Status& status, absl::string_view server) {
     case absl::StatusCode::kNotFound:
     case absl::StatusCode::kAlreadyExists:
     case absl::StatusCode::kOutOfRange:
-    case absl::StatusCode::kFailedPrecondition:
       return kExitBadInput;
+    case absl::StatusCode::kFailedPrecondition:
     case absl::StatusCode::kResourceExhausted:
       return server.empty() ? kExitBadInput : kExitServer;
     case absl::StatusCode::kAborted:

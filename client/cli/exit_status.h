@@ -18,8 +18,10 @@ enum ExitStatus : int {
   kExitServer = 3,    // the server cannot be reached, or it refused
 };
 
-// Returns the exit status for an error. `server` is empty for a local computation, for which an
-// exceeded limit is bad input, and a model that cannot be asked for now is no fault of a server.
+// Returns the exit status for an error. What a daemon does not find, or has already, is bad input;
+// what its state or its limits do not allow is a refusal. `server` is empty for a local
+// computation, for which an exceeded limit is bad input, and a model that cannot be asked for now
+// is no fault of a server.
 ExitStatus ExitStatusOf(const absl::Status& status, absl::string_view server);
 
 // Prints an error in one line and returns its exit status. `status` must not be OK.

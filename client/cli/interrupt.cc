@@ -35,6 +35,10 @@ Interrupt::Interrupt() {
   POLYEST_CHECK(signal_pipe[0] == -1);
   POLYEST_CHECK(pipe2(signal_pipe, O_CLOEXEC | O_NONBLOCK) == 0);
   struct sigaction action = {};
+  sigaction(SIGINT, nullptr, &action);
+  ignored_ = action.sa_handler == SIG_IGN;
+  if (ignored_) return;
+  action = {};
   action.sa_handler = OnSignal;
   // The first signal restores the default action; interrupted reads are restarted.
   action.sa_flags = static_cast<int>(SA_RESETHAND) | SA_RESTART;
@@ -42,7 +46,7 @@ Interrupt::Interrupt() {
 }
 
 Interrupt::~Interrupt() {
-  signal(SIGINT, SIG_DFL);
+  if (!ignored_) signal(SIGINT, SIG_DFL);
   close(signal_pipe[0]);
   close(signal_pipe[1]);
   signal_pipe[0] = signal_pipe[1] = -1;

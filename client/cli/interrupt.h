@@ -8,7 +8,8 @@ namespace polyest::internal {
 
 // Turns Ctrl-C into an event that can be waited for. While the object exists, the first SIGINT
 // requests an orderly end and restores the mode of the terminal (keyboard.h); a second one ends the
-// process as usual. Only one object may exist at a time.
+// process as usual. Where the process is to ignore SIGINT, as in the background of a shell script,
+// it does. Only one object may exist at a time.
 class Interrupt {
  public:
   Interrupt();
@@ -22,6 +23,9 @@ class Interrupt {
   int descriptor() const;
   // Waits until `time` or until SIGINT is received.
   void WaitUntil(std::chrono::steady_clock::time_point time) const;
+
+ private:
+  bool ignored_ = false;
 };
 
 // Reads a file descriptor. An interrupt ends the input, also while it waits for a pipe.

@@ -43,8 +43,7 @@ absl::Status CheckHasSamples(Client& client, const std::string& session) {
   get.set_omit_problem(true);
   POLYEST_ASSIGN_OR_RETURN(const v1::Session found, client.GetSession(get));
   if (found.sample_count() > 0) return absl::OkStatus();
-  return absl::FailedPreconditionError(
-      absl::StrCat(session, " has no estimate yet: no sample has arrived"));
+  return absl::NotFoundError(absl::StrCat(session, " has no estimate yet: no sample has arrived"));
 }
 
 }  // namespace

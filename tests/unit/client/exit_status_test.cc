@@ -29,6 +29,11 @@ TEST(ExitStatusOf, TakesALimitPassedInThisProcessForBadInput) {
   EXPECT_EQ(ExitStatusOf(absl::ResourceExhaustedError(""), kServer), 3);
 }
 
+TEST(ExitStatusOf, TakesWhatADaemonsStateDoesNotAllowForARefusal) {
+  EXPECT_EQ(ExitStatusOf(absl::FailedPreconditionError(""), kServer), 3);
+  EXPECT_EQ(ExitStatusOf(absl::FailedPreconditionError(""), ""), 2);
+}
+
 TEST(Report, PrintsOneLine) {
   std::ostringstream err;
   EXPECT_EQ(Report(absl::InvalidArgumentError("first\nsecond"), "", err), 2);
