@@ -6,7 +6,7 @@
 #   deploy/cluster/up.sh [FOLDER]        FOLDER is new; by default /tmp/polyest-cluster
 #
 # POLYESTD and POLYEST name the programs (by default those in the PATH), PORT haproxy's port (50050).
-set -euo pipefail
+set -Eeuo pipefail
 
 here=$(cd "$(dirname "$0")" && pwd)
 . "$here/common.sh"
