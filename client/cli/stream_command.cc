@@ -2,6 +2,7 @@
 #include <absl/strings/str_format.h>
 #include <absl/strings/string_view.h>
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -41,6 +42,11 @@ namespace {
 // The pauses between attempts to open a session.
 constexpr std::chrono::milliseconds kFirstPause{500};
 constexpr std::chrono::milliseconds kMaxPause{5'000};
+
+bool IsRegularFile(int descriptor) {
+  struct stat file;
+  return fstat(descriptor, &file) == 0 && S_ISREG(file.st_mode);
+}
 
 // Delays batches by the times of their rows.
 class Pace {
@@ -125,7 +131,7 @@ class StreamCommand {
     options.any_first_run = !arguments_.session.empty();
     // Editors omit the end of a file's last line, but a program that writes it to a pipe has been
     // stopped within the line, and within a number perhaps.
-    options.whole_lines = arguments_.data_file == "-";
+    options.whole_lines = !IsRegularFile(descriptor);
     POLYEST_ASSIGN_OR_RETURN(const DataColumns columns,
                              DataColumnsFor(problem_, arguments_.place, options));
     auto reader = DataReader::Open(in, DataName(), columns);

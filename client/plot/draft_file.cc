@@ -91,7 +91,8 @@ absl::StatusOr<std::unique_ptr<DraftFile>> DraftFile::Open(const std::string& fi
   if (exists && S_ISDIR(there.st_mode)) return CannotWrite(file, EISDIR);
   if (!exists || S_ISREG(there.st_mode)) {
     if (draft->OpenDraft(exists ? mode & there.st_mode : mode)) return draft;
-    if (!exists || errno != EACCES) return draft->Failed();
+    // Without room for a draft, the old file stays.
+    if (!exists || (errno != EACCES && errno != EPERM && errno != EROFS)) return draft->Failed();
   }
   draft->descriptor_ = open(draft->target_.c_str(), O_WRONLY | O_TRUNC | O_CLOEXEC | O_NOCTTY);
   if (draft->descriptor_ < 0) return draft->Failed();
