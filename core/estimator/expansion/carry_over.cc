@@ -98,7 +98,9 @@ absl::StatusOr<Inherited> Judge(const ResolvedProblem& problem, const RegionalEx
                                 const Stop& stop, double max_shift) {
   POLYEST_RETURN_IF_ERROR(Refusal(problem, present, kept, design));
   Inherited inherited{.error = ErrorIn(design, present, kept.absorbed)};
-  const double max_error = max_shift * max_shift * present.noise().misfit;
+  const double misfit = present.noise().misfit;
+  if (!(present.RoundingError() <= max_shift * misfit)) return Refused("the sums are rounded");
+  const double max_error = max_shift * max_shift * misfit;
   if (!(inherited.error <= max_error)) return Refused("the sums are not accurate enough");
   if (!kept.trajectories.ensemble) return inherited;
   if (rows - kept.absorbed.rows < RowsToJudge(problem)) {

@@ -73,7 +73,8 @@ double ModelMismatch(const RegionalExpansion& expansion, const ConstVectorRef& d
 }
 
 double LargestShift(const RegionalExpansion& expansion, double power) {
-  return std::sqrt(power * expansion.OwnError()) + power * expansion.LogVarianceError();
+  return std::sqrt(power * expansion.OwnError()) +
+         power * (expansion.LogVarianceError() + expansion.RoundingError());
 }
 
 CheckDifferences DifferencesAtChecks(const RegionalExpansion& expansion, const Cost& cost) {
@@ -124,6 +125,7 @@ Agreement AgreementWithModel(const RegionalExpansion& expansion, const Cost& cos
     agreement.shift = std::min(agreement.shift, spread + carried);
     if (spread <= kMaxSpreadOfMean) agreement.mean_difference = mean;
   }
+  agreement.shift += cost.power() * expansion.RoundingError();
   return agreement;
 }
 

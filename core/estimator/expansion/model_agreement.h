@@ -15,7 +15,8 @@ double ModelMismatch(const RegionalExpansion& expansion, const ConstVectorRef& d
 
 // Returns √(β Σ ρ_k/R_k), by Cauchy–Schwarz the largest shift of a posterior mean, in its standard
 // deviations, that the residuals of the expansion at its collocation points allow; β is `power`,
-// that of the likelihood. With filters, β times the error of ½ Σ log(S/σ²) is added.
+// that of the likelihood. With filters, β times the error of ½ Σ log(S/σ²) is added, and always
+// that of rounding, which scatters the cost from point to point.
 double LargestShift(const RegionalExpansion& expansion, double power);
 // An expansion whose LargestShift at the power 1 is at most this is as good as the model, all over
 // its region.

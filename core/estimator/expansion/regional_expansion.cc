@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "core/bayes/noise.h"
 #include "core/common/check.h"
@@ -246,6 +247,12 @@ void RegionalExpansion::AddDifference(int channel, const ConstVectorRef& coeffic
       difference_, unit * error - absorbed_.previous_error[channel], 1);
   previous = unit * coefficients;
   absorbed_.previous_error[channel] = unit * error;
+}
+
+double RegionalExpansion::RoundingError() const {
+  double squares = 0;
+  for (const ChannelSums& sums : absorbed_.sums) squares += sums.samples.w();
+  return std::numeric_limits<double>::epsilon() * squares;
 }
 
 Cost RegionalExpansion::MakeCost(double regularization) const {

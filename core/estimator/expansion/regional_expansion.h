@@ -119,6 +119,9 @@ class RegionalExpansion {
   // Returns the part of OwnError() that the check points' own trajectories do not show, because it
   // was taken over from an expansion over another region.
   double CarriedError() const { return absorbed_.carried_error; }
+  // Returns the rounding error of the sums' χ², ε Σ e²/R with the errors e at the reference: of a
+  // posterior far from it, little is left of their squares (bayes/mismatch_sums.h).
+  double RoundingError() const;
   // Returns the root mean square, over the collocation points, of ½ Σ log(S/σ²) of the model minus
   // that of the expansion; 0 without filters.
   double LogVarianceError() const;

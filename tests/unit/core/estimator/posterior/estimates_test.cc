@@ -5,8 +5,11 @@
 
 #include <cmath>
 #include <numbers>
+#include <random>
+#include <vector>
 
 #include "tests/unit/core/estimator/estimation.h"
+#include "tests/unit/core/estimator/text_problem.h"
 
 namespace polyest::internal::estimates_test {
 namespace {
@@ -77,6 +80,35 @@ TEST(Estimates, OfALinearProblemWithAUniformPriorAreLeastSquares) {
   EXPECT_NEAR(estimate.channels[0].noise_std_dev, kNoise, 1e-15);
   EXPECT_EQ(estimate.parameters[0].unit, "m/s");
   EXPECT_EQ(estimate.parameters[0].verdict, Verdict::kIdentified);
+  EXPECT_THAT(estimate.diagnostics, ::testing::IsEmpty());
+}
+
+// About the prior's mean the squares of the errors sum up to 2000 · 10¹⁴, of which rounding leaves
+// some tens. The residuals are 2000 numbers of 1.
+TEST(Estimates, OfASensorFarMorePreciseThanThePriorAreLeastSquares) {
+  constexpr double kPrecise = 1e-8;
+  std::mt19937_64 generator(1);
+  std::normal_distribution<double> normal;
+  std::vector<double> values;
+  Sums exact;
+  for (int k = 1; k <= 2000; ++k) {
+    const double slope = 1 + 1e-3 * k;
+    values.push_back(0.3 * slope + kPrecise * normal(generator));
+    exact.s += slope * values.back() / (kPrecise * kPrecise);
+    exact.information += slope * slope / (kPrecise * kPrecise);
+  }
+  const Problem problem =
+      TextProblem("a*(1 + t/1000)", {UncertainParameter::Uniform("a", 0, 1).value()}, kPrecise);
+  const Estimate estimate = Processed(problem, values)->CurrentEstimate().value();
+  double chi_squared = 0;
+  for (int k = 1; k <= 2000; ++k) {
+    const double error = values[static_cast<size_t>(k - 1)] - exact.best() * (1 + 1e-3 * k);
+    chi_squared += error * error / (kPrecise * kPrecise);
+  }
+  EXPECT_NEAR(estimate.channels[0].chi_squared, chi_squared, 1e-4 * chi_squared);
+  ExpectGaussian(estimate.parameters[0], exact);
+  EXPECT_NEAR(estimate.parameters[0].posterior_std_dev, exact.std_dev(),
+              4 * exact.std_dev() / std::sqrt(kParticles));
   EXPECT_THAT(estimate.diagnostics, ::testing::IsEmpty());
 }
 
