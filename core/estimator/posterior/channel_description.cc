@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/bayes/noise.h"
+#include "core/estimator/posterior/corrected_lag1.h"
 #include "core/estimator/posterior/independent_share.h"
 #include "core/estimator/posterior/noise_learning.h"
 #include "core/estimator/posterior/residual_tests.h"
@@ -98,8 +99,8 @@ double JudgedChiSquared(const AssessmentRequest& request, int c, const Outliers&
 }
 
 void DescribeChannel(const AssessmentRequest& request, const Cost& cost, const Vector& eta,
-                     const Vector& d, const PosteriorDraws& posterior, double fitted, int c,
-                     ChannelEstimate& channel) {
+                     const Vector& d, const PosteriorDraws& posterior, const CorrectedLag1& lag1,
+                     double fitted, int c, ChannelEstimate& channel) {
   const RecordSummary::Channel& summary = request.record->channels()[static_cast<size_t>(c)];
   const ChannelSums& sums = request.expansion->sums()[static_cast<size_t>(c)];
   const ChannelNoise& noise = request.expansion->noise().channels[static_cast<size_t>(c)];
@@ -119,8 +120,7 @@ void DescribeChannel(const AssessmentRequest& request, const Cost& cost, const V
   const Outliers outliers =
       OutliersAt(*request.expansion, handling, d, c, sums.samples.ChiSquared(d) / mean_square);
   channel.chi_squared = JudgedChiSquared(request, c, outliers, share);
-  channel.lag1_correlation =
-      std::clamp(sums.Lag1Correlation(d) + Lag1Correction(share, samples), -1.0, 1.0);
+  channel.lag1_correlation = lag1.Of(sums, d);
   DescribeSums(request, eta, d, c, channel);
   channel.noise_time_constant_s = noise.time_constant_s;
   channel.noise_white_share = noise.white_share;
@@ -145,12 +145,13 @@ std::vector<ChannelEstimate> DescribeChannels(const AssessmentRequest& request, 
                                               const Vector& eta, const PosteriorDraws& posterior,
                                               double fitted) {
   const Vector d = cost.BasisDifference(eta);
+  const CorrectedLag1 lag1(cost, *request.expansion->design().basis, eta);
   std::vector<ChannelEstimate> channels;
   for (int c = 0; c < request.problem->channels(); ++c) {
     ChannelEstimate channel;
     channel.output = request.problem->problem().measured[static_cast<size_t>(c)].output;
     if (!request.record->channels().empty()) {
-      DescribeChannel(request, cost, eta, d, posterior, fitted, c, channel);
+      DescribeChannel(request, cost, eta, d, posterior, lag1, fitted, c, channel);
     }
     const std::map<std::string, double>& fixed = request.problem->problem().fixed;
     if (const auto noise = fixed.find(NoiseName(channel.output)); noise != fixed.end()) {

@@ -8,6 +8,7 @@
 #include "core/bayes/noise.h"
 #include "core/common/linear_algebra.h"
 #include "core/estimator/expansion/search_domain.h"
+#include "core/estimator/posterior/corrected_lag1.h"
 #include "core/estimator/posterior/noise_choice.h"
 #include "core/estimator/problem/process_noise.h"
 
@@ -106,7 +107,7 @@ class Revision {
       const bool together =
           correlated && !weighted && ReviseTimeConstant(c, sums, model.unknown, noise);
       if (model.unknown && !together) ReviseScale(c, sums, share, noise);
-      if (correlated && weighted) ReviseCorrelation(c, sums, share, noise);
+      if (correlated && weighted) ReviseCorrelation(c, sums, noise);
       if (!noise.learned) changed_ = noise.learned = true;
     }
     if (HandlesOutliers(problem_.problem())) RevisePosterior();
@@ -236,11 +237,11 @@ class Revision {
 
   // Revises the time constant by the correlation left at the mean interval. An outlier spoils the
   // likelihood of every other time constant, but only that of the present one has its weights.
-  void ReviseCorrelation(int c, const ChannelSums& sums, double share, ChannelNoise& noise) {
+  void ReviseCorrelation(int c, const ChannelSums& sums, ChannelNoise& noise) {
     const RecordSummary::Channel& channel = record_.channels()[static_cast<size_t>(c)];
     const auto samples = static_cast<double>(sums.samples.count());
     if (channel.intervals == 0) return;
-    const double left = sums.Lag1Correlation(d_) + Lag1Correction(share + sums.spent, samples);
+    const double left = CorrectedLag1(cost_, *expansion_.design().basis, eta_).Of(sums, d_);
     const double present = channel.Correlation(noise);
     const double asked = CorrelationBehind(left, present);
     // The standard error of a correlation a is √((1 − a²)/N).

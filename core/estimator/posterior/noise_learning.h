@@ -57,11 +57,6 @@ std::optional<LearnedNoise> ReviseNoise(const ResolvedProblem& problem,
                                         const RecordSummary& record, const Matrix& particles,
                                         const Stop& stop);
 
-// Returns the bias correction for the lag-1 correlation of N residuals of which a fit has used up
-// `share` degrees of freedom. The fit makes the correlation too small by share/N. The sums do not
-// distinguish the last sample, which makes it too large by ½/N.
-inline double Lag1Correction(double share, double samples) { return (share - 0.5) / samples; }
-
 // Returns Σ λ/(1 + λ), the number of parameters that the data have fitted, 0 … n.
 // `mismatch_hessian` is in germ coordinates.
 double FittedParameters(const ConstMatrixRef& mismatch_hessian, const Prior& prior);
