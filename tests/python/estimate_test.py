@@ -1,6 +1,9 @@
 """One-shot estimates: the numbers, and the forms in which data and problems may come."""
 
 import json
+import os
+import pathlib
+import subprocess
 
 import numpy as np
 import pandas as pd
@@ -8,6 +11,8 @@ import pytest
 
 import polyest
 from conftest import EXAMPLES, TRUTH
+from polyest._proto.v1 import estimate_pb2
+from polyest.estimates import of_message
 
 
 @pytest.fixture(scope="module")
@@ -81,6 +86,38 @@ def test_notebooks_show_values_units_and_verdicts(estimate):
     for shown in ("41.2976 ± 0.0032", "N/m", "identified", "χ²"):
         assert shown in html
     assert "k          41.2976 ± 0.0032" in repr(estimate)
+
+
+def test_the_dictionary_is_what_the_command_prints(tmp_path, problem, rows, client):
+    problem.save(tmp_path / "problem.json")
+    data = rows(0, 100)
+    lines = ["t,x", *(f"{float(t)!r},{float(x)!r}" for t, x in zip(data["t"], data["x"]))]
+    (tmp_path / "data.csv").write_text("\n".join(lines) + "\n")
+    program = pathlib.Path(os.environ["POLYEST_DAEMON"]).with_name("polyest")
+    done = subprocess.run([program, "estimate", tmp_path / "problem.json", tmp_path / "data.csv",
+                           "--server", client.server, "--format", "json"],
+                          capture_output=True, text=True, check=True)
+    found = client.estimate(problem, data)
+    assert found.diagnostics == [] and found.to_dict()["diagnostics"] == []
+    assert found.to_dict() == json.loads(done.stdout)
+
+
+def test_tables_show_one_value_of_a_parameter():
+    def parameter(verdict, posterior_std_dev):
+        message = estimate_pb2.ParameterEstimate(
+            name="k", map=1.5, std_dev=0.5, mean=2.0, posterior_std_dev=posterior_std_dev,
+            verdict=verdict)
+        return of_message(estimate_pb2.Estimate(parameters=[message]))
+
+    verdicts = estimate_pb2.Identifiability
+    for verdict, deviation, shown, text in (
+            (verdicts.IDENTIFIED, 0.25, (1.5, 0.5), "1.50 ± 0.50"),
+            (verdicts.WEAK, 0.9, (1.5, 0.5), "1.50 ± 0.50"),
+            (verdicts.NOT_IDENTIFIED, 0.25, (2.0, 0.25), "2.00 ± 0.25"),
+            (verdicts.NOT_IDENTIFIED, 0.0, (1.5, 0.5), "1.50 ± 0.50")):
+        found = parameter(verdict, deviation)
+        assert found["k"].shown == shown
+        assert text in repr(found) and text in found._repr_html_()
 
 
 def test_an_unidentified_parameter_is_told_in_words(client, problem, record):

@@ -82,9 +82,8 @@ def estimate_of_csv(folder, csv, problem=PROBLEM, *options):
 
 
 def same(estimate, parameters):
-    """Returns whether an estimate has these numbers to the last bit; the command prints zeros."""
-    return estimate.to_dict()["parameters"] == [
-        {name: value for name, value in one.items() if value != 0} for one in parameters]
+    """Returns whether an estimate has these numbers to the last bit, as the command prints them."""
+    return estimate.to_dict()["parameters"] == parameters
 
 
 class Waits:

@@ -2,12 +2,26 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
+from google.protobuf import json_format
+from google.protobuf.message import Message
 
 from polyest._table import Floats
+
+# Whether fields that are empty or 0 are printed, too; protobuf 5 has given the option a new name.
+_ALL_FIELDS = {name: True for name in ("including_default_value_fields",
+                                       "always_print_fields_with_no_presence")
+               if name in inspect.signature(json_format.MessageToDict).parameters}
+
+
+def to_dict(message: Message) -> dict[str, Any]:
+    """Returns a message as JSON has it, with all of its fields, as the command prints them."""
+    result: dict[str, Any] = json_format.MessageToDict(message, **_ALL_FIELDS)
+    return result
 
 
 def array(values: Iterable[float], *shape: int) -> Floats:

@@ -49,6 +49,17 @@ class Parameter:
         """Whether the data determine the parameter."""
         return self.verdict == "IDENTIFIED"
 
+    @property
+    def shown(self) -> tuple[float, float]:
+        """The value that tables show and its standard deviation, as `polyest estimate` has them.
+
+        That is `map` ± `std_dev`. Where the data say less than the prior ("NOT_IDENTIFIED"), the
+        most probable value may be any that the prior allows: then `mean` ± `posterior_std_dev`.
+        """
+        if self.verdict == "NOT_IDENTIFIED" and self.posterior_std_dev > 0:
+            return self.mean, self.posterior_std_dev
+        return self.map, self.std_dev
+
     def as_dict(self) -> dict[str, Any]:
         """Returns the fields by name."""
         return dataclasses.asdict(self)

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Optional
 
 import numpy as np
-from google.protobuf import json_format
 
 from polyest import _html
-from polyest._messages import array, enum_name
+from polyest._messages import array, enum_name, to_dict
 from polyest._proto.v1 import estimate_pb2
 from polyest._table import Floats
 from polyest.estimate_parts import (
@@ -130,7 +129,11 @@ class Estimate:
 
     def to_dict(self) -> dict[str, Any]:
         """Returns what `polyest estimate --format json` prints."""
-        result: dict[str, Any] = json_format.MessageToDict(self.message)
+        result = to_dict(self.message)
+        for direction in result["directions"]:
+            # A list of pairs in the contract, and a map wherever it is printed.
+            direction["coefficients"] = {one["parameter"]: one["value"]
+                                         for one in direction["coefficients"]}
         return result
 
     def to_json(self) -> str:
@@ -145,7 +148,7 @@ class Estimate:
                             ).set_index("name")
 
     def _rows(self) -> list[tuple[str, ...]]:
-        return [(one.name, _html.uncertain(one.map, one.std_dev), one.unit,
+        return [(one.name, _html.uncertain(*one.shown), one.unit,
                  _html.interval(one.lower95, one.upper95),
                  _html.uncertain(one.prior_mean, one.prior_std_dev),
                  _html.number(one.contraction, 2), one.verdict) for one in self.parameters]

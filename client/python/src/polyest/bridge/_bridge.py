@@ -11,11 +11,13 @@ from dataclasses import dataclass
 from typing import Any, Optional
 
 from polyest._measurements import MeasurementConverter
+from polyest._parameters import ParameterNames
 from polyest._table import refuse
 from polyest.bridge._configuration import Configuration
 from polyest.bridge._feeder import Feeder
 from polyest.bridge._publishers import CanOutlet, publisher_of
 from polyest.bridge._sources import source_of
+from polyest.bridge._values import in_words
 from polyest.client import Client
 from polyest.connecting import connect
 from polyest.estimates import Estimate
@@ -79,7 +81,7 @@ class Bridge:
         message = to_message(self._problem)
         _check_channels(configuration.channels, MeasurementConverter(message))
         self._source = source_of(configuration, self.say)
-        names = {one.name: one for one in message.uncertain}
+        names = ParameterNames(message)
         self._publishers = [
             publisher_of(number, target, configuration.session.name, names, self.say)
             for number, target in enumerate(configuration.targets)]
@@ -164,8 +166,7 @@ class Bridge:
             parts.append(f"no sample for {time.monotonic() - last:.0f} s")
         latest = self._latest
         if latest is not None:
-            parts.append(f"estimate at t = {latest.time:.2f} s: " + ", ".join(
-                f"{one.name} = {one.mean:.5g} ± {one.std_dev:.2g}" for one in latest))
+            parts.append(f"estimate at t = {latest.time:.2f} s: {in_words(latest)}")
         parts.append(f"{counts.published} published")
         for what, found in (
                 ("reconnects", {"daemon": counts.daemon_reconnects,

@@ -7,9 +7,10 @@ import math
 import pathlib
 import sys
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any, Optional, Protocol
 
+from polyest._parameters import ParameterNames
 from polyest._table import refuse
 from polyest.bridge._backoff import Backoff
 from polyest.bridge._configuration import Target
@@ -43,7 +44,7 @@ class Outlet(Protocol):
 class CanOutlet:
     """Sends a message of a CAN database."""
 
-    def __init__(self, field: str, target: Target, names: Mapping[str, Any]) -> None:
+    def __init__(self, field: str, target: Target, names: ParameterNames) -> None:
         """Raises InvalidInput for a message, signal or value that does not exist."""
         assert target.bus is not None
         self._bus_options = target.bus
@@ -254,7 +255,7 @@ class Publisher(threading.Thread):
             self.sent += 1
 
 
-def publisher_of(number: int, target: Target, session: str, names: Mapping[str, Any],
+def publisher_of(number: int, target: Target, session: str, names: ParameterNames,
                  say: Callable[[str], None]) -> Publisher:
     """Returns the publisher of a target. Raises InvalidInput and ImportError."""
     field = f"publish[{number}]"

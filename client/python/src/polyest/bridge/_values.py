@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
+from polyest import _html
+from polyest._parameters import ParameterNames
 from polyest._table import refuse
 from polyest.estimates import Estimate
 from polyest.io._choices import unknown
@@ -20,16 +22,15 @@ _WHOLE: dict[str, Callable[[Estimate], float]] = {
 _OF_PARAMETER = ("mean", "std_dev", "map", "lower95", "upper95", "contraction", "identified")
 
 
-def check_path(field: str, path: str, names: Mapping[str, Any]) -> None:
-    """Raises InvalidInput unless there is such a value; `names` has the problem's parameters."""
+def check_path(field: str, path: str, names: ParameterNames) -> None:
+    """Raises InvalidInput unless there is such a value; `names` are the problem's parameters."""
     if path in _WHOLE:
         return
     name, _, what = path.rpartition(".")
     if what not in _OF_PARAMETER or not name:
         raise refuse(field, f"'{path}' is no value of an estimate: those are PARAMETER."
                      f"{'|'.join(_OF_PARAMETER)}, {', '.join(_WHOLE)}")
-    # A parameter that each run has of its own is named with the run's number.
-    if name.partition("[")[0] not in names:
+    if name not in names:
         raise unknown(field, "uncertain parameter", name, names)
 
 
@@ -39,6 +40,11 @@ def value_of(estimate: Estimate, path: str) -> float:
         return float(_WHOLE[path](estimate))
     name, _, what = path.rpartition(".")
     return float(getattr(estimate[name], what))
+
+
+def in_words(estimate: Estimate) -> str:
+    """Returns the values that tables show, as in "k = 41.298 ± 0.003, c = 0.230 ± 0.001"."""
+    return ", ".join(f"{one.name} = {_html.uncertain(*one.shown)}" for one in estimate)
 
 
 def as_json(session: str, estimate: Estimate) -> dict[str, Any]:

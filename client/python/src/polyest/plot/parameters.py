@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def estimate(result: Estimate) -> Figure:
-    """Draws each parameter: ± 2 standard deviations of the prior, the 95 % interval, the map."""
+    """Draws each parameter: ± 2 standard deviations of the prior, 95 % interval, value shown."""
     figure, axes = _figure.panels(len(result), height=0.9, share_x=False)
     for axis, one in zip(axes[:, 0], result):
         spread = 2 * one.prior_std_dev
@@ -25,7 +25,7 @@ def estimate(result: Estimate) -> Figure:
                   height=0.8)
         axis.barh(0, one.upper95 - one.lower95, left=one.lower95, color=_figure.POSTERIOR,
                   height=0.5)
-        axis.plot([one.map], [0], "|", color=_figure.MEASURED, markersize=12)
+        axis.plot([one.shown[0]], [0], "|", color=_figure.MEASURED, markersize=12)
         axis.set_yticks([])
         axis.set_ylabel(one.name, rotation=0, ha="right", va="center")
         axis.set_xlabel(_figure.label(one.verdict.lower().replace("_", " "), one.unit))
