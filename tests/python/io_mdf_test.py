@@ -109,6 +109,38 @@ def test_invalid_samples_are_missing(tmp_path, monkeypatch):
     np.testing.assert_array_equal(found["x"], times[~invalid])
 
 
+def test_an_invalid_sample_may_be_no_number(tmp_path):
+    values, invalid = np.array([1, np.inf, 3.0]), np.array([False, True, False])
+    path = write(tmp_path / "a.mf4", [("defl", "mm", np.arange(3.0), values, invalid)])
+    assert list(mdf.read(path, {"x": "defl"}).to_dict()["x"]) == [1, 3]
+    path = write(tmp_path / "b.mf4", [("defl", "mm", np.arange(3.0), values, ~invalid)])
+    with pytest.raises(polyest.InvalidInput, match="defl: row 1 .*inf is not finite"):
+        mdf.read(path, {"x": "defl"}).all()
+
+
+@pytest.mark.parametrize(("unit", "length"), [
+    ("", 1.0), ("s", 1.0), ("ms", 1e-3), ("msec", 1e-3), ("usec", 1e-6), ("hours", 3600.0)])
+def test_times_are_in_the_unit_that_the_file_gives(tmp_path, unit, length):
+    path = with_unit_of_time(tmp_path, unit)
+    found = mdf.read(path, {"x": "defl"}).all().time_s
+    np.testing.assert_allclose(found, np.array([100.0, 200.0]) * length, rtol=1e-15)
+
+
+def test_an_unknown_unit_of_time_is_refused(tmp_path):
+    path = with_unit_of_time(tmp_path, "ticks")
+    with pytest.raises(polyest.InvalidInput, match="the time of 'defl': 'ticks' is no unit of ti"):
+        mdf.read(path, {"x": "defl"}).all()
+
+
+def with_unit_of_time(folder, unit):
+    """Writes a file whose times 100 and 200 are in a unit."""
+    with asammdf.MDF(version="4.10") as file:
+        file.append([asammdf.Signal(np.ones(2), np.array([100.0, 200.0]), name="defl")])
+        file.groups[0].channels[file.masters_db[0]].unit = unit
+        file.save(folder / "a.mf4", overwrite=True)
+    return folder / "a.mf4"
+
+
 def test_units_are_those_of_the_file_unless_others_are_given(tmp_path, client):
     times = np.arange(5) / 4
     path = write(tmp_path / "a.mf4", [("defl", "mm", times, times), ("w", "1/min", times, times)])

@@ -43,6 +43,16 @@ def test_nullable_columns_of_pandas_have_missing_samples():
     assert list(converter().convert(frame).channels[0].missing) == [1]
 
 
+@pytest.mark.parametrize("kind", ["object", "string", "category"])
+def test_a_text_column_of_pandas_is_refused_only_where_it_is_used(kind):
+    texts = pd.Series(["a", None]).astype(kind)
+    frame = pd.DataFrame({"t": [0.0, 1.0], "x": [1.0, 2.0], "note": texts})
+    with pytest.warns(UserWarning, match="are not used: note"):
+        assert values_of(converter().convert(frame)) == {"x": [1.0, 2.0]}
+    with pytest.raises(polyest.InvalidInput, match="x: has values of type .*; it must have numbers"):
+        converter().convert(pd.DataFrame({"t": [0.0, 1.0], "x": texts}))
+
+
 def test_objects_with_none_have_missing_samples():
     found = converter().convert({"t": [0.0, 1.0], "x": [None, 2.0]})
     assert list(found.channels[0].missing) == [0]
@@ -234,6 +244,34 @@ def test_what_cannot_be_meant_is_refused_with_the_rule(data, said):
 def test_an_unknown_unit_of_time_names_those_that_are_known():
     with pytest.raises(polyest.InvalidInput, match="'mm' is no unit of time; known are s, ms"):
         converter(units={"t": "mm"}).convert({"t": [0.0], "x": [1.0]})
+
+
+@pytest.mark.parametrize(("unit", "seconds"), [
+    ("sec", 1.0), ("MSEC", 1e-3), ("µsec", 1e-6), (" ms ", 1e-3), ("Minuten", 60.0),
+    ("hours", 3600.0)])
+def test_units_of_time_are_spelled_as_measuring_systems_do(unit, seconds):
+    found = converter(units={"t": unit}).convert({"t": [0.0, 2.0], "x": [1.0, 1.0]})
+    assert list(found.time_s) == [0.0, 2 * seconds]
+
+
+@pytest.mark.parametrize(("headers", "said"), [
+    (("x [mm]", "x (m)"), r"x: may be the column 'x \[mm\]', 'x \(m\)'; columns.x.from of the"),
+    (("t [ms]", "t (s)"), r"t: may be the column 't \[ms\]', 't \(s\)'")])
+def test_a_column_with_two_readings_is_refused(headers, said):
+    data = {"t": [0.0], "x": [1.0], **{header: [2.0] for header in headers}}
+    del data[headers[0][0]]
+    with pytest.raises(polyest.InvalidInput, match=said):
+        converter().convert(data)
+    # The whole header decides, as it does for the command.
+    data[headers[0][0]] = [3.0]
+    with pytest.warns(UserWarning, match="are not used"):
+        assert len(converter().convert(data).time_s) == 1
+
+
+@pytest.mark.parametrize("units", [["x"], {"x": 5}, 5])
+def test_units_are_texts_by_name(units):
+    with pytest.raises(polyest.WrongType, match="^units"):
+        converter(units=units)
 
 
 def test_a_split_record_has_the_same_rows():

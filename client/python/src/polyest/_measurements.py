@@ -12,6 +12,7 @@ from typing import Optional
 import numpy as np
 
 from polyest._proto.v1 import measurements_pb2, problem_pb2, session_service_pb2
+from polyest._request import texts
 from polyest._table import Array, Clock, Data, Floats, Table, floats, refuse, row_text
 from polyest.io._choices import nearest
 from polyest.io._recording import Batch, Recording
@@ -73,7 +74,7 @@ class MeasurementConverter:
         # The field's name is a word of Python.
         self._sources = {name: (getattr(column, "from"), column.unit)
                          for name, column in problem.columns.items()}
-        self._units = dict(units or {})
+        self._units = texts("units", units)
         self._measured = [measured.output for measured in problem.measured]
         self._streamed = [signal.name for signal in problem.inputs if signal.HasField("streamed")]
         known = {"t", "pi", *self._measured, *self._streamed}
@@ -203,24 +204,19 @@ class MeasurementConverter:
         if wanted in table.columns:
             in_header = _split_header(wanted)[1] if source else ""
             return wanted, unit or in_header, table.columns[wanted]
-        for header, values in table.columns.items():
-            name, in_header = _split_header(header)
-            if name == wanted and in_header:
-                return header, unit or in_header, values
-        return None if source else self._find_with_ending(table, quantity, unit)
+        parts = {header: _split_header(header) for header in table.columns}
+        found = [(header, in_header) for header, (name, in_header) in parts.items()
+                 if name == wanted and in_header]
+        if not found and not source:
+            found = self._with_endings(table, quantity)
+        return _only_one(table, quantity, unit, found)
 
-    def _find_with_ending(self, table: Table, quantity: str,
-                          unit: str) -> Optional[tuple[str, str, Array]]:
-        """Returns the column of a quantity with its unit behind an underscore, as in "x_mm"."""
+    def _with_endings(self, table: Table, quantity: str) -> list[tuple[str, str]]:
+        """Returns the columns of a quantity with its unit behind an underscore, as in "x_mm"."""
         taken = {*self.names, *(header for header, _ in self._sources.values())}
-        found = [(header, header[len(quantity) + 1:]) for header in table.columns
-                 if header.startswith(f"{quantity}_") and header not in taken
-                 and header[len(quantity) + 1:] in _ENDINGS]
-        if len(found) > 1:
-            raise refuse(quantity, f"may be the column {_listed([one for one, _ in found])}; "
-                         f"columns.{quantity}.from of the problem decides")
-        return next(((header, unit or ending, table.columns[header]) for header, ending in found),
-                    None)
+        return [(header, header[len(quantity) + 1:]) for header in table.columns
+                if header.startswith(f"{quantity}_") and header not in taken
+                and header[len(quantity) + 1:] in _ENDINGS]
 
     def _check_units(self) -> None:
         headers = [header for quantity, (header, _) in self._sources.items()
@@ -264,6 +260,19 @@ class MeasurementConverter:
         if unused:
             warnings.warn(f"columns that the problem does not name are not used: "
                           f"{', '.join(unused)}", stacklevel=6)
+
+
+def _only_one(table: Table, quantity: str, unit: str,
+              found: list[tuple[str, str]]) -> Optional[tuple[str, str, Array]]:
+    """Returns header, unit and values of the one column that is found; None if there is none.
+
+    found: the headers and their units. unit: goes before these. Raises InvalidInput for several.
+    """
+    if len(found) > 1:
+        raise refuse(quantity, f"may be the column {_listed([header for header, _ in found])}; "
+                     f"columns.{quantity}.from of the problem decides")
+    return next(((header, unit or in_header, table.columns[header])
+                 for header, in_header in found), None)
 
 
 def _with_rows(measurements: Measurements) -> Measurements:

@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+import contextlib
+import math
+import operator
+import re
 from collections.abc import Mapping
 from typing import Any, TypeVar
 
-from google.protobuf.descriptor import FieldDescriptor
+import numpy as np
+from google.protobuf.descriptor import Descriptor, FieldDescriptor
 from google.protobuf.message import Message
 
-from polyest.errors import WrongType
+from polyest._table import refuse
+from polyest.errors import PolyestError, WrongType
 
 Request = TypeVar("Request", bound=Message)
 
-# The arguments of studies that fill fields of other names.
+# The arguments that fill fields of other names.
 _ARGUMENTS = {
+    "session_id": "name",
     "draw_count": "draws", "max_row_count": "max_rows", "lag_count": "lags",
     "density_bin_count": "density_bins", "joint_bin_count": "joint_bins",
     "sample_count": "samples", "point_count": "points", "history_point_count": "points",
@@ -34,6 +41,82 @@ def wrong(argument: str, value: Any, rule: str) -> WrongType:
     shown = text if len(text) <= 60 else text[:57] + "…"
     rule = f"{shown} of the type {type(value).__name__} must be {rule}"
     return WrongType(f"{argument}: {rule}", field=argument, rule=rule)
+
+
+def number(argument: str, value: Any, what: str = "a number") -> float:
+    """Returns a number; True and False are none. Raises WrongType, which names the argument."""
+    if not isinstance(value, (bool, np.bool_)):
+        with contextlib.suppress(TypeError, ValueError, OverflowError):
+            return float(value)
+    raise wrong(argument, value, what)
+
+
+def at_least(argument: str, value: Any, least: float) -> float:
+    """Returns a finite number that is not below a limit. Raises InvalidInput for another."""
+    found = number(argument, value)
+    if not (math.isfinite(found) and found >= least):
+        raise refuse(argument, f"{value} must be a finite number ≥ {least:g}")
+    return found
+
+
+def whole(argument: str, value: Any, least: int) -> int:
+    """Returns a whole number that is not below a limit. Raises InvalidInput for another."""
+    if isinstance(value, (bool, np.bool_)) or not hasattr(value, "__index__"):
+        raise wrong(argument, value, "a whole number")
+    found = operator.index(value)
+    if found < least:
+        raise refuse(argument, f"{value} must be a whole number ≥ {least}")
+    return found
+
+
+def numbers(argument: str, values: Any) -> Any:
+    """Returns an array of numbers of any shape. Raises WrongType, which names the argument."""
+    try:
+        return np.asarray(values, dtype=float)
+    except (TypeError, ValueError):
+        raise wrong(argument, values, "numbers") from None
+
+
+def pair(argument: str, values: tuple[Any, ...]) -> tuple[float, float]:
+    """Returns two numbers, the bounds of something. Raises WrongType."""
+    if len(values) != 2:
+        raise wrong(argument, values, "a number, or two: the bounds of an unknown one")
+    return number(argument, values[0]), number(argument, values[1])
+
+
+def json_of(argument: str, value: Any, what: str) -> dict[str, Any]:
+    """Returns the JSON object of a prior or a signal. Raises WrongType for anything else."""
+    if isinstance(value, type) or not hasattr(value, "as_json"):
+        raise wrong(argument, value, what)
+    found: dict[str, Any] = value.as_json()
+    return found
+
+
+def texts(argument: str, values: Any) -> dict[str, str]:
+    """Returns a mapping from names to texts, as of units; None is empty. Raises WrongType."""
+    if values is None:
+        return {}
+    if not isinstance(values, Mapping):
+        raise wrong(argument, values, "a dict of texts by name")
+    for name, value in values.items():
+        if not isinstance(value, str):
+            raise wrong(f"{argument}.{name}", value, "a text")
+    return dict(values)
+
+
+def with_arguments(error: PolyestError, request: Descriptor) -> PolyestError:
+    """Returns an error of the daemon that names fields of the request as its caller does.
+
+    The daemon writes them as JSON has them, such as "drawCount" for the argument `draws`.
+    """
+    for field in request.fields:
+        argument = _ARGUMENTS.get(field.name, field.name)
+        if field.camelcase_name not in (argument, field.name):
+            word = re.compile(rf"\b{field.camelcase_name}\b")
+            error.args = (word.sub(argument, error.message),)
+            error.field, error.rule = (word.sub(argument, text)
+                                       for text in (error.field, error.rule))
+    return error
 
 
 def make(kind: type[Request], **fields: Any) -> Request:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import datetime
 import re
 from collections.abc import Mapping
@@ -22,14 +23,31 @@ Data = Union[Mapping[str, npt.ArrayLike], Array, Any]
 
 _DECIMAL_COMMA = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?")
 
-# Seconds in each unit of time.
-_SECONDS = {"": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6, "ns": 1e-9,
-            "min": 60.0, "h": 3600.0}
+# Seconds in each unit of time, and how measuring systems spell the units.
+_SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6, "ns": 1e-9, "min": 60.0,
+            "h": 3600.0}
+_SPELLINGS = {
+    "s": ("sec", "secs", "second", "seconds", "sekunde", "sekunden"),
+    "ms": ("msec", "msecs", "millisecond", "milliseconds", "millisekunden"),
+    "us": ("usec", "usecs", "µsec", "μsec", "microsecond", "microseconds", "mikrosekunden"),
+    "ns": ("nsec", "nsecs", "nanosecond", "nanoseconds", "nanosekunden"),
+    "min": ("mins", "minute", "minutes", "minuten"),
+    "h": ("hr", "hrs", "hour", "hours", "std", "stunde", "stunden"),
+}
 
 
 def refuse(field: str, rule: str) -> InvalidInput:
     """Returns the exception for data that break a rule."""
     return InvalidInput(f"{field}: {rule}", field=field, rule=rule)
+
+
+def seconds_in(field: str, unit: str) -> float:
+    """Returns the length of a unit of time, s, whatever its case; "" is s. Raises InvalidInput."""
+    word = unit.strip().lower() or "s"
+    known = next((one for one, words in _SPELLINGS.items() if word in words), word)
+    if known not in _SECONDS:
+        raise refuse(field, f"'{unit}' is no unit of time; known are {', '.join(_SECONDS)}")
+    return _SECONDS[known]
 
 
 def row_text(row: int) -> str:
@@ -106,11 +124,15 @@ def _array(name: str, values: Any) -> Array:
 
 
 def _values_of(series: Any) -> Array:
-    """Returns the values of a pandas column; missing ones of nullable types become NaN."""
+    """Returns the values of a pandas column; missing numbers of nullable types become NaN.
+
+    Texts stay what they are: `floats` refuses them where the problem takes numbers from them.
+    """
     values = np.asarray(series)
     nullable = values.dtype == object and str(getattr(series, "dtype", "object")) != "object"
     if nullable and not _has_zone(values):
-        values = series.to_numpy(dtype=float, na_value=np.nan)
+        with contextlib.suppress(TypeError, ValueError):
+            values = series.to_numpy(dtype=float, na_value=np.nan)
     return values
 
 
@@ -171,11 +193,8 @@ class Clock:
             values = values - self._origin
         if values.dtype.kind == "m":
             result: Floats = values / np.timedelta64(1, "ns") * 1e-9
-        elif unit in _SECONDS:
-            result = floats(name, values) * _SECONDS[unit]
         else:
-            raise refuse(name, f"'{unit}' is no unit of time; known are "
-                         f"{', '.join(unit for unit in _SECONDS if unit)}")
+            result = floats(name, values) * seconds_in(name, unit)
         _check_present(name, np.isnan(result))
         return result
 

@@ -7,6 +7,7 @@ import importlib
 from collections.abc import Iterable, Mapping
 from typing import Any, Optional
 
+from polyest._request import texts
 from polyest._table import refuse
 from polyest.errors import InvalidInput
 
@@ -65,10 +66,11 @@ def check_channels(channels: Mapping[str, Any]) -> None:
 
 def units_of(found: Mapping[str, str], given: Optional[Mapping[str, str]]) -> dict[str, str]:
     """Returns each channel's unit: the given one, else the file's in the daemon's spelling."""
-    for name in given or {}:
+    own = texts("units", given)
+    for name in own:
         if name not in found:
             raise unknown("units", "channel", name, found)
-    return {name: (given or {}).get(name, spelled(unit)) for name, unit in found.items()}
+    return {name: own.get(name, spelled(unit)) for name, unit in found.items()}
 
 
 # How measuring systems write units, and how the daemon does.

@@ -12,6 +12,7 @@ from typing import Literal, Optional
 
 import numpy as np
 
+from polyest._request import at_least, whole
 from polyest._table import Array, Floats, refuse
 from polyest.io._recording import Batch
 
@@ -29,10 +30,8 @@ def check_options(time_zero: TimeZero, batch_rows: int, reorder_window_s: float 
     """Raises InvalidInput for options of `read` that are out of their range."""
     if time_zero not in ("auto", "file", "first"):
         raise refuse("time_zero", f"must be one of auto, file, first; got '{time_zero}'")
-    if batch_rows < 1:
-        raise refuse("batch_rows", f"must be ≥ 1; got {batch_rows}")
-    if not reorder_window_s >= 0:
-        raise refuse("reorder_window_s", f"must be ≥ 0; got {reorder_window_s}")
+    whole("batch_rows", batch_rows, 1)
+    at_least("reorder_window_s", reorder_window_s, 0)
 
 
 def nanoseconds(time_s: float) -> int:

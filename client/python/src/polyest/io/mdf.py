@@ -9,7 +9,7 @@ from typing import Any, Optional, Union
 
 import numpy as np
 
-from polyest._table import _SECONDS, Array, Floats, floats, refuse
+from polyest._table import Array, Floats, floats, refuse, seconds_in
 from polyest.errors import InvalidInput
 from polyest.io._choices import check_channels, needed, units_of, unknown
 from polyest.io._merge import Track, merged
@@ -84,10 +84,10 @@ def read(file: File, channels: Mapping[str, Choice], *,
     batch_rows: the most rows of a batch; memory holds some 100,000 samples of each channel.
 
     Samples that the file marks as invalid are missing, and so are NaN and, among numbers, values
-    that the file has a text for. Raises InvalidInput, which is a ValueError, for a file that is
-    none, a name that does not exist (it lists the nearest) or that several channels have, channels
-    of text or of several dimensions, groups without time and times that decrease; ImportError
-    without asammdf.
+    that the file has a text for. Times without a unit are in s. Raises InvalidInput, which is a
+    ValueError, for a file that is none, a name that does not exist (it lists the nearest) or that
+    several channels have, channels of text or of several dimensions, groups without time or in an
+    unknown unit of time, and times that decrease; ImportError without asammdf.
     """
     check_channels(channels)
     check_options(time_zero, batch_rows)
@@ -184,7 +184,7 @@ def _seconds_of(opened: Any, one: ChannelInfo) -> float:
             master = opened.groups[group].channels[index]
             if getattr(master, "sync_type", 1) not in (0, 1):
                 raise refuse(one.name, f"is sampled over '{master.name}', which is no time")
-            return _SECONDS.get(getattr(master, "unit", "") or "", 1.0)
+            return seconds_in(f"the time of '{one.name}'", getattr(master, "unit", "") or "")
     raise refuse(one.name, f"has no times: group {one.group} lacks them")
 
 
@@ -197,7 +197,6 @@ def _values(one: ChannelInfo, signal: Any) -> Floats:
     if samples.dtype.kind not in "fiub" or samples.ndim != 1:
         raise refuse(one.name, f"is no channel of numbers: it has values of type {samples.dtype} "
                      f"and shape {samples.shape[1:]}")
-    values = floats(one.name, samples)
     if signal.invalidation_bits is not None:
-        values = np.where(np.asarray(signal.invalidation_bits, dtype=bool), np.nan, values)
-    return values
+        samples = np.where(np.asarray(signal.invalidation_bits, dtype=bool), np.nan, samples)
+    return floats(one.name, samples)
