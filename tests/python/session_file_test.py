@@ -1,6 +1,8 @@
 """Tests that sessions go into files and come back."""
 
 import os
+import re
+from concurrent import futures
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -53,7 +55,56 @@ def test_an_exported_file_is_on_the_disk_before_it_has_its_name(
     with client.session("synced", problem) as session:
         session.append(rows(0, 200))
         session.export(file)
-    assert synced == [(f"{file}.part", False), (str(tmp_path), True)]
+    (draft, _), *others = synced
+    assert re.fullmatch(rf"{file}\.[0-9a-f]+\.part", draft) and not synced[0][1]
+    assert others == [(str(tmp_path), True)]
+    assert list(tmp_path.iterdir()) == [file]
+
+
+@pytest.fixture
+def kept(client, problem, rows):
+    """A session with rows."""
+    with client.session("kept", problem) as session:
+        session.append(rows(0, 10))
+        yield session
+    client.delete_session("kept")
+
+
+def test_an_export_that_cannot_be_written_leaves_nothing(kept, tmp_path):
+    (tmp_path / "folder").mkdir()
+    for name, why in (("folder", "Is a directory"), ("none/file", "No such file or directory")):
+        with pytest.raises(polyest.InvalidInput, match=f"{name}: cannot be written: {why}") as one:
+            kept.export(tmp_path / name)
+        assert one.value.field == "file"
+    assert [one.name for one in tmp_path.iterdir()] == ["folder"]
+    with pytest.raises(polyest.ResourceExhausted, match="/dev/full: cannot be written") as full:
+        kept.export("/dev/full")
+    assert full.value.reason == "DISK_FULL"
+
+
+def test_an_export_replaces_no_other_file(kept, client, tmp_path):
+    target, link, other = tmp_path / "target", tmp_path / "link", tmp_path / "link.part"
+    target.write_text("old")
+    other.write_text("another's")
+    link.symlink_to(target)
+    kept.export(link)
+    assert link.is_symlink() and other.read_text() == "another's"
+    assert client.import_session(target, "by-link").estimate().samples == 10
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    with futures.ThreadPoolExecutor(1) as executor:
+        reading = executor.submit(pipe.read_bytes)
+        kept.export(pipe)
+        assert reading.result() == target.read_bytes()
+    assert pipe.is_fifo()
+
+
+def test_a_session_file_that_cannot_be_read_is_named(client, tmp_path):
+    with pytest.raises(polyest.InvalidInput, match="none: cannot be read: No such file") as raised:
+        client.import_session(tmp_path / "none")
+    assert raised.value.field == "file"
+    with pytest.raises(polyest.WrongType, match="file: 5 of the type int must be the path"):
+        client.import_session(5)
 
 
 def test_an_import_that_is_interrupted_is_cancelled(client, tmp_path, monkeypatch):

@@ -203,7 +203,10 @@ class Session(SessionStudies):
                 yield prediction.of_message(response.prediction)
 
     def export(self, file: Union[str, os.PathLike[str]]) -> None:
-        """Writes the session to a file, as `polyest export`; `Client.import_session` reads it."""
+        """Writes the session to a file, as `polyest export`; `Client.import_session` reads it.
+
+        Raises InvalidInput if the file cannot be written; one that was there is then as it was.
+        """
         self._settle()
         request = session_service_pb2.ExportSessionRequest(name=self._resource)
         with SessionFileWriter(file) as writer:
