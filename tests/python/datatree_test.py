@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 import polyest
+from conftest import EXAMPLES
 from polyest import datatree
-from polyest._draws import prior_draws
+from polyest._draws import draws_of, prior_draws
 
 xarray = pytest.importorskip("xarray")
 
@@ -48,6 +49,64 @@ def test_draws_have_the_likelihood_of_the_exact_solution(experiment, record):
     new = groups["posterior_predictive"]["x"].values[0]
     # The standard deviation of 20,000 draws scatters by 0.5 %.
     assert abs((new - exact).std() / 0.01 - 1) < 4 * 0.005
+
+
+def test_the_likelihood_is_that_of_every_row(client, problem):
+    times = np.arange(1, 2501) * 0.01
+    # The exact solution of the oscillator, c²/4 ≪ k.
+    x = np.exp(-0.115 * times) * np.cos(np.sqrt(41.3 - 0.115**2) * times)
+    experiment = client.experiment(problem, {"t": times, "x": x})
+    groups = datatree.groups(experiment, samples=2, predictive=True)
+    assert groups["log_likelihood"]["x"].sizes["row"] == 2500
+    assert groups["observed_data"]["x"].sizes["row"] == 2500
+    with pytest.warns(UserWarning, match="have 2000 of 2500 rows"):
+        datatree.groups(experiment, samples=2)
+
+
+def test_the_prior_has_the_parameters_of_the_posterior(client):
+    problem = polyest.Problem.read(EXAMPLES / "releases.json")
+    data = np.genfromtxt(EXAMPLES / "releases.csv", delimiter=",", names=True)
+    groups = datatree.groups(client.experiment(problem, data), samples=20)
+    assert list(groups["prior"].data_vars) == list(groups["posterior"].data_vars)
+    first, second = groups["prior"]["x0[0]"], groups["prior"]["x0[1]"]
+    assert float(abs(first - second).max()) > 0  # each run has its own
+
+
+@pytest.mark.parametrize(("prior", "middle", "unit"), [
+    (polyest.Normal(40, 4), "k.mean", 4.0), (polyest.Uniform(30, 50), "k.median", 1.0),
+    (polyest.Lognormal(40, 4), "k.median", np.sqrt(np.log1p(0.01)))],
+    ids=["normal", "uniform", "lognormal"])
+def test_draws_of_a_population_are_those_of_its_prior(prior, middle, unit):
+    problem = (polyest.Problem.builtin("mass_spring_damper")
+               .uncertain("k", prior, per_run=True, population=True)
+               .uncertain("c", polyest.Uniform(0, 1), drift=(0.01, 1.0))
+               .process_noise("v", (1e-4, 1.0)))
+    names = [middle, "k.spread", "k[3]", "c", "c.drift", "processNoise.v"]
+    drawn = draws_of(names, problem.as_dict(), DRAWS, 1)
+    assert list(drawn) == names
+    # Medians of the contract; that of n draws scatters by √(π/2n) standard deviations.
+    error = 4 * np.sqrt(np.pi / 2 / DRAWS)
+    assert abs(np.median(np.log(drawn["k.spread"] / (unit / 2)))) < error
+    assert abs(np.std(np.log(drawn["k.spread"])) - 1) < 4 / np.sqrt(2 * DRAWS)
+    # 40, ln 40 less half the variance of the logarithm, and 20/√12 or 4 of them.
+    centre = 40 / np.sqrt(1.01) if "lognormal" in prior.as_json() else 40
+    assert abs(np.median(drawn[middle]) - centre) < error * 7
+    assert abs(np.median(drawn["k[3]"]) - centre) < error * 10
+    # Runs scatter about the middle by the spread.
+    assert np.std(drawn["k[3]"] - drawn[middle]) > 1
+    for name, lower, upper in (("c.drift", 0.01, 1.0), ("processNoise.v", 1e-4, 1.0)):
+        logarithm = np.log(drawn[name] / lower) / np.log(upper / lower)
+        assert 0 <= logarithm.min() and logarithm.max() <= 1
+        assert abs(logarithm.mean() - 0.5) < 4 / np.sqrt(12 * DRAWS)
+
+
+def test_draws_far_out_in_a_tail_are_within_the_bounds():
+    problem = polyest.Problem.builtin("mass_spring_damper").uncertain(
+        "k", polyest.TruncatedNormal(0, 1, lower=9))
+    drawn = prior_draws(problem.as_dict(), DRAWS, 1)["k"]
+    # Mills' ratio: the mean is 9 + 1/9 − 2/9³ to 0.1 %, and the standard deviation is 0.11.
+    assert drawn.min() >= 9 and len(set(drawn)) > DRAWS / 2
+    assert abs(drawn.mean() - (9 + 1 / 9 - 2 / 9**3)) < 0.001 + 4 * 0.11 / np.sqrt(DRAWS)
 
 
 def test_samples_that_are_not_independent_have_no_likelihood_here(client, record):

@@ -18,6 +18,10 @@ if TYPE_CHECKING:
 _POINT = 1e-9
 
 
+# The most rows of a record in an answer of the daemon.
+MOST_ROWS = 1_000_000
+
+
 @dataclass(frozen=True)
 class OutputsAtDraws:
     """One output at each draw."""
@@ -39,7 +43,7 @@ def outputs_at_draws(experiment: Experiment, posterior: Posterior) -> dict[str, 
     noises: dict[str, list[Floats]] = {}
     for draw in posterior.samples:
         fixed = _problem_at(experiment._problem(), dict(zip(names, map(float, draw))))
-        prediction = experiment._with(fixed).predict(draws=2)
+        prediction = experiment._with(fixed).predict(draws=2, max_rows=MOST_ROWS)
         for name, one in prediction.outputs.items():
             if one.sample_std_dev is None:
                 raise refuse("predictive", f"the noise of {name} is not known")

@@ -11,13 +11,14 @@ It returns no outputs at single draws: if they are asked for, each draw takes a 
 
 from __future__ import annotations
 
+import warnings
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from google.protobuf import json_format
 
-from polyest._at_draws import outputs_at_draws
-from polyest._draws import prior_draws
+from polyest._at_draws import MOST_ROWS, outputs_at_draws
+from polyest._draws import draws_of
 from polyest._table import Integers, refuse
 from polyest.results import Posterior, Prediction
 
@@ -32,7 +33,9 @@ def of_studies(studies: Studies, *, samples: int = 1000, seed: int = 0,
     samples: of the posterior and of the prior. seed: of the prior's, which are drawn here, and of
     new samples' noise. predictive: adds `posterior_predictive`, new samples at each draw, and
     `log_likelihood`, in 1/unit, of the samples measured; of an experiment only, at the cost of a
-    call of the daemon for each draw, and where noise is known and white (InvalidInput elsewhere).
+    call of the daemon for each draw, and where noise is known and white (InvalidInput elsewhere);
+    all rows of the record are then there, 1,000,000 at most. Without it, a longer record than 2,000
+    rows has so many evenly spaced ones, with a warning.
     Raises ImportError if xarray is not there, or older than 2024.10, which brought DataTree.
     """
     import xarray
@@ -48,14 +51,28 @@ def groups(studies: Studies, *, samples: int = 1000, seed: int = 0,
            predictive: bool = False) -> dict[str, Any]:
     """Returns the groups as xarray.Dataset by name; arguments as of `of_studies`."""
     problem = json_format.MessageToDict(studies._problem())
-    prediction = studies.predict()
+    prediction = _predicted(studies, predictive)
     posterior = studies.posterior(samples=samples)
+    prior = draws_of(posterior.parameters, problem, samples, seed)
     found = {"posterior": _posterior(posterior),
-             "prior": _draws(prior_draws(problem, samples, seed), np.array([], dtype=np.int64)),
+             "prior": _draws(prior, np.array([], dtype=np.int64)),
              "observed_data": _observed(prediction), "prediction": _prediction(prediction)}
     if predictive:
         found.update(_predictive(studies, posterior, prediction, seed))
     return found
+
+
+def _predicted(studies: Studies, all_rows: bool) -> Prediction:
+    """Returns the prediction of the record. Raises InvalidInput if `all_rows` are too many."""
+    prediction = studies.predict(max_rows=MOST_ROWS if all_rows else 0)
+    shown = len(prediction.time_s)
+    if shown < prediction.row_count:
+        if all_rows:
+            raise refuse("predictive", f"the record has {prediction.row_count} rows; there may be "
+                         f"{MOST_ROWS}")
+        warnings.warn(f"observed_data and prediction have {shown} of {prediction.row_count} rows, "
+                      "evenly spaced", stacklevel=4)
+    return prediction
 
 
 def _predictive(studies: Studies, posterior: Posterior, prediction: Prediction,
