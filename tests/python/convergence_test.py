@@ -90,6 +90,8 @@ def test_importance_sampling_has_no_r_hat(client, problem, record):
     assert found.converged
     for one in found.parameters.values():
         assert math.isnan(one.r_hat) and one.effective_sample_size >= 400
+        assert math.isnan(posterior[one.name].r_hat)
+    assert math.isnan(posterior.r_hat)
     assert "has no chains and no R̂" in repr(found)
     assert repr(found).splitlines()[2].split() == [
         "k", "–", f"{found['k'].effective_sample_size:.0f}", "suffices"]

@@ -101,9 +101,7 @@ class Convergence:
 
 def of_posterior(posterior: Posterior) -> Convergence:
     """Returns the convergence of a posterior's draws."""
-    has_chains = posterior.method == "MARKOV_CHAINS"
     return Convergence(
-        {name: ParameterConvergence(name, one.r_hat if has_chains else math.nan,
-                                    one.effective_sample_size)
+        {name: ParameterConvergence(name, one.r_hat, one.effective_sample_size)
          for name, one in posterior.parameters.items()},
         posterior.method, posterior.draw_count)

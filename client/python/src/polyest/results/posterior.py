@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -38,7 +39,7 @@ class Marginal:
     density: Floats
     #: Number of independent draws that would tell as much.
     effective_sample_size: float
-    #: Rank-normalized split R̂, near 1 when the chains agree; 0 for importance sampling.
+    #: Rank-normalized split R̂, near 1 when the chains agree; NaN for importance sampling.
     r_hat: float
 
 
@@ -79,7 +80,7 @@ class Posterior:
     draw_count: int
     #: Number of independent draws that would tell as much: the least of the parameters'.
     effective_sample_size: float
-    #: The largest R̂ of the parameters; 0 for importance sampling, which has no chains.
+    #: The largest R̂ of the parameters; NaN for importance sampling, which has no chains.
     r_hat: float
     #: Warnings, as of an estimate.
     diagnostics: list[Diagnostic]
@@ -116,11 +117,16 @@ class Posterior:
 
 
 def of_message(message: study_service_pb2.ComputePosteriorResponse) -> Posterior:
-    """Returns a posterior as the daemon has sent it."""
+    """Returns a posterior as the daemon has sent it, whose R̂ is 0 where there are no chains."""
+    method = enum_name(message, "method")
+
+    def r_hat(sent: float) -> float:
+        return sent if method == "MARKOV_CHAINS" else math.nan
+
     return Posterior(
         parameters={one.name: Marginal(one.name, one.unit, one.mean, one.std_dev,
                                        array(one.quantiles), array(one.value), array(one.density),
-                                       one.effective_sample_size, one.r_hat)
+                                       one.effective_sample_size, r_hat(one.r_hat))
                     for one in message.parameters},
         probabilities=array(message.probabilities),
         joints=[Joint(one.first, one.second, array(one.first_value), array(one.second_value),
@@ -128,7 +134,7 @@ def of_message(message: study_service_pb2.ComputePosteriorResponse) -> Posterior
                 for one in message.joints],
         samples=array(message.samples).reshape(-1, max(len(message.parameters), 1)),
         sample_chains=np.fromiter(message.sample_chains, dtype=np.int64),
-        method=enum_name(message, "method"), draw_count=message.draw_count,
-        effective_sample_size=message.effective_sample_size, r_hat=message.r_hat,
+        method=method, draw_count=message.draw_count,
+        effective_sample_size=message.effective_sample_size, r_hat=r_hat(message.r_hat),
         diagnostics=[Diagnostic.of_message(one) for one in message.diagnostics],
         time_s=message.time_s, sequence=message.sequence)
