@@ -43,9 +43,9 @@ def test_data_that_lack_a_streamed_input_are_refused_before_they_are_sent(client
     driven = problem.copy().stream("force")
     missing = "the column 'force' for the streamed input of that name is missing"
     experiment = client.experiment(driven, {**rows(0, 10), "force": rows(0, 10)["x"]})
+    for found in (client.check(driven, rows(0, 10)), driven.check(rows(0, 10), client=client)):
+        assert [missing in one.description for one in found.errors] == [True]
     for call in (lambda: client.estimate(driven, rows(0, 10)),
-                 lambda: client.check(driven, rows(0, 10)),
-                 lambda: driven.check(rows(0, 10), client=client),
                  lambda: experiment.predict(record=rows(10, 20))):
         with pytest.raises(polyest.InvalidInput, match=missing):
             call()

@@ -7,13 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Generic, Optional, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Optional, TypeVar, Union
 
-import numpy as np
 import numpy.typing as npt
-from google.protobuf import json_format
 
-from polyest import _methods, check, estimates, results
+from polyest import _methods, _parsing, check, estimates, results
+from polyest._measurements import MeasurementConverter
 from polyest._proto.v1 import (
     measurements_pb2,
     problem_pb2,
@@ -21,7 +20,10 @@ from polyest._proto.v1 import (
     session_service_pb2,
     study_service_pb2,
 )
-from polyest._request import make, wrong
+from polyest._request import json_of, make, number, numbers, wrong
+from polyest._table import Data
+from polyest.errors import InvalidInput, WrongType
+from polyest.problem import ProblemLike, to_message
 from polyest.results import cost, design, history, posterior, prediction, prior
 from polyest.signals import Signal
 
@@ -83,13 +85,30 @@ def get_history(session: str) -> Call[results.History]:
                 lambda answer: history.of_message(answer.history))
 
 
-def check_problem(problem: problem_pb2.Problem,
-                  measurements: Optional[measurements_pb2.Measurements]) -> Call[check.Check]:
-    """What is wrong with a problem and its measurements."""
+def check_problem(problem: ProblemLike, data: Optional[Data],
+                  units: Optional[Mapping[str, str]]) -> Union[Call[check.Check], check.Check]:
+    """What is wrong with a problem and its data.
+
+    What no daemon can be asked about is found here: a value that a problem cannot have, which is
+    then the only finding, and data that are no measurements.
+    """
+    try:
+        message = to_message(problem)
+    except InvalidInput as error:
+        if isinstance(error, WrongType) or not error.field:
+            raise
+        return check.of_errors([error])
+    converter = MeasurementConverter(message, units)
+    faults: list[InvalidInput] = []
+    measurements = None
+    try:
+        measurements = None if data is None else converter.convert(data)
+    except InvalidInput as error:
+        faults.append(error)
     return Call(_methods.CHECK_PROBLEM,
-                problem_service_pb2.CheckProblemRequest(problem=problem,
+                problem_service_pb2.CheckProblemRequest(problem=message,
                                                         measurements=measurements),
-                check.of_message)
+                lambda answer: check.of_message(answer, faults))
 
 
 def predict(subject: Subject, *, outputs: Sequence[str], probabilities: Sequence[float],
@@ -103,7 +122,7 @@ def predict(subject: Subject, *, outputs: Sequence[str], probabilities: Sequence
         lag_count=lags, horizon_s=horizon_s, smoothed=smoothed, forecast_s=forecast_s,
         first_scored_row=first_scored_row, record=record)
     if times is not None:
-        for time_s in _numbers("times", times):
+        for time_s in numbers("times", times).ravel():
             request.times.add(run=run, time_s=time_s)
     return Call(_methods.PREDICT, request, prediction.of_message)
 
@@ -196,24 +215,11 @@ def compute_design(subject: Subject, *, until_s: float, step_s: float, samples: 
     for name, inputs in _entries("candidates", candidates, "inputs by name"):
         candidate = request.candidates.add(name=name)
         for signal_name, signal in _entries(f"candidates.{name}", inputs, "signals by input"):
-            candidate.inputs.append(input_of(signal_name, signal))
+            candidate.inputs.append(
+                input_of(f"candidates.{name}.{signal_name}", signal_name, signal))
     for output, noise in _entries("outputs", outputs, "noise by output"):
-        request.possible.add(output=output).noise.absolute = _number(f"outputs.{output}", noise)
+        request.possible.add(output=output).noise.absolute = number(f"outputs.{output}", noise)
     return Call(_methods.COMPUTE_EXPERIMENT_DESIGN, request, design.of_message)
-
-
-def _numbers(argument: str, values: npt.ArrayLike) -> Any:
-    try:
-        return np.asarray(values, dtype=float).ravel()
-    except (TypeError, ValueError):
-        raise wrong(argument, values, "numbers") from None
-
-
-def _number(argument: str, value: Any) -> float:
-    try:
-        return float(value)
-    except (TypeError, ValueError):
-        raise wrong(argument, value, "a number") from None
 
 
 def _entries(argument: str, value: Any, what: str) -> Iterable[tuple[str, Any]]:
@@ -222,8 +228,9 @@ def _entries(argument: str, value: Any, what: str) -> Iterable[tuple[str, Any]]:
     raise wrong(argument, value, f"a dict, {what}")
 
 
-def input_of(name: str, signal: Signal) -> problem_pb2.Input:
-    """Returns an input with its signal as a message."""
+def input_of(path: str, name: str, signal: Signal) -> problem_pb2.Input:
+    """Returns an input with its signal as a message; errors name it by `path`."""
     message = problem_pb2.Input()
-    json_format.ParseDict({"name": name, **signal.as_json()}, message)
+    document = json_of(path, signal, "a signal, such as polyest.Step(1.0)")
+    _parsing.parse({"name": name, **document}, message, prefix=path)
     return message

@@ -12,7 +12,8 @@ from typing import Any, Optional, Union
 
 import grpc
 
-from polyest.errors import InvalidInput, PolyestError, Unavailable, of_rpc
+from polyest._request import number, with_arguments
+from polyest.errors import InvalidInput, PolyestError, Unavailable, WrongType, of_rpc
 
 File = Union[str, "os.PathLike[str]"]
 
@@ -35,13 +36,19 @@ class ConnectionOptions:
     timeout_s: Optional[float] = None
 
     def __post_init__(self) -> None:
-        """Raises InvalidInput unless the server is HOST:PORT: gRPC would dial something else."""
+        """Raises InvalidInput for what gRPC would take otherwise, or refuse only at a call."""
         host, _, port = str(self.server).rpartition(":")
         if _is_ipv6(str(self.server)) or _is_ipv6(host):
             raise _invalid("server", f'"{self.server}" must be HOST:PORT, an IPv6 address in '
                            "brackets, as in [::1]:50051")
         if not host or not _PORT.fullmatch(port) or not 1 <= int(port[-5:]) <= 65535:
             raise _invalid("server", f'"{self.server}" must be HOST:PORT, the port from 1 to 65535')
+        if self.token is not None and not isinstance(self.token, str):
+            # What it is stays secret.
+            raise WrongType(f"token: a value of the type {type(self.token).__name__} must be a "
+                            "text", field="token", rule="must be a text")
+        if self.timeout_s is not None and not number("timeout_s", self.timeout_s) >= 0:
+            raise _invalid("timeout_s", f"{self.timeout_s} must be ≥ 0")
 
     @property
     def uses_tls(self) -> bool:
@@ -106,9 +113,14 @@ class ConnectionOptions:
         certificate = _certificates("certificate", self.certificate)
         return grpc.ssl_channel_credentials(ca, _key(self.key, self.certificate), certificate)
 
-    def error_of(self, error: grpc.RpcError) -> PolyestError:
-        """Returns the exception of a failed call, with the server's name if there is none."""
+    def error_of(self, error: grpc.RpcError, request: Any = None) -> PolyestError:
+        """Returns the exception of a failed call, with the server's name if there is none.
+
+        request: the type of the call's request, whose fields are then named as arguments.
+        """
         found = of_rpc(error)
+        if request is not None:
+            found = with_arguments(found, request.DESCRIPTOR)
         if isinstance(found, Unavailable) and self.server not in found.message:
             return Unavailable(f"{self.server}: {found.message}", reason=found.reason,
                                retry_after_s=found.retry_after_s)

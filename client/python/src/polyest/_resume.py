@@ -15,6 +15,7 @@ from typing import Optional
 
 from polyest._proto.v1 import measurements_pb2, session_service_pb2
 from polyest._refusals import count_rows_from
+from polyest._request import at_least, whole
 from polyest.errors import (
     Aborted,
     AlreadyExists,
@@ -34,20 +35,30 @@ Request = session_service_pb2.StreamMeasurementsRequest
 class StreamOptions:
     """How a session sends its batches and connects again."""
 
-    #: Rows of a batch at most; longer data are cut.
+    #: Rows of a batch at most, ≥ 1; longer data are cut.
     batch_rows: int = 10_000
     #: Batches without acknowledgement at which sending waits, ≥ 1.
     max_unacknowledged: int = 16
-    #: The daemon makes an estimate after every so many batches; None: only when it is asked.
+    #: The daemon makes an estimate after every so many batches, ≥ 1; None: only when it is
+    #: asked.
     estimate_every: Optional[int] = 1
     #: The least time from one estimate to the next, s, ≥ 0; one due earlier waits for a batch.
     estimate_interval_s: float = 0.0
-    #: The delay before the first attempt to connect again, s; it doubles from one to the next.
+    #: The delay before the first attempt to connect again, s, ≥ 0; it doubles from one to the next.
     first_delay_s: float = 0.1
-    #: The longest such delay, s.
+    #: The longest such delay, s, ≥ 0.
     max_delay_s: float = 2.0
     #: Attempts to reach the daemon without an acknowledgement in between, ≥ 0.
     max_attempts: int = 32
+
+    def __post_init__(self) -> None:
+        """Raises InvalidInput for what would lose rows or wait for ever."""
+        for name, least in (("batch_rows", 1), ("max_unacknowledged", 1), ("max_attempts", 0)):
+            whole(name, getattr(self, name), least)
+        if self.estimate_every is not None:
+            whole("estimate_every", self.estimate_every, 1)
+        for name in ("estimate_interval_s", "first_delay_s", "max_delay_s"):
+            at_least(name, getattr(self, name), 0)
 
 
 @dataclass(frozen=True)

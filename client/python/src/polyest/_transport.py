@@ -57,7 +57,7 @@ class Transport:
             response: Response = call(request, metadata=self.options.metadata(),
                                       timeout=timeout_s or self.options.timeout_s)
         except grpc.RpcError as error:
-            raise self.options.error_of(error) from None
+            raise self.options.error_of(error, method.request) from None
         return response
 
     def run(self, call: Call[Result]) -> Result:
@@ -74,7 +74,7 @@ class Transport:
         try:
             yield from call
         except grpc.RpcError as error:
-            raise self.options.error_of(error) from None
+            raise self.options.error_of(error, method.request) from None
         finally:
             call.cancel()
 
@@ -107,7 +107,8 @@ class Transport:
         except grpc.FutureCancelledError:
             raise failures[0] from None
         except grpc.RpcError as error:
-            raise (failures[0] if failures else self.options.error_of(error)) from None
+            raise (failures[0] if failures
+                   else self.options.error_of(error, method.request)) from None
         finally:
             call.cancel()  # has no effect on a call that has ended
         return response

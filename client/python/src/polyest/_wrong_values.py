@@ -92,6 +92,8 @@ def _rule(value: Any, field: FieldDescriptor) -> str:
         limit = _WHOLE[kind]
         return "" if -2.0**limit <= number < 2.0**limit else f"a whole number below 2^{limit}"
     if kind in _REAL:
+        if isinstance(value, float) and not math.isfinite(value):
+            return "a finite number"
         return "" if number is not None else "a number"
     if kind == FieldDescriptor.CPPTYPE_BOOL:
         return "" if isinstance(value, bool) or value in ("true", "false") else "true or false"

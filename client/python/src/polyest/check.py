@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from polyest._html import page, table
@@ -71,10 +72,18 @@ class Check:
         return page(table(("", "", ""), rows))
 
 
-def of_message(message: problem_service_pb2.CheckProblemResponse) -> Check:
-    """Returns what the daemon has found."""
+def of_errors(faults: Iterable[InvalidInput]) -> Check:
+    """Returns errors that were found without the daemon."""
+    return Check([Finding(one.field, one.rule or one.message) for one in faults], [], [])
+
+
+def of_message(message: problem_service_pb2.CheckProblemResponse,
+               faults: Sequence[InvalidInput] = ()) -> Check:
+    """Returns what the daemon has found, and errors that were found without it."""
     def findings(found: object) -> list[Finding]:
         return [Finding(one.field, one.description) for one in found]  # type: ignore[attr-defined]
 
-    return Check(findings(message.errors), findings(message.warnings),
-                 [Remark(one.topic, one.name, one.description) for one in message.summary])
+    errors = findings(message.errors) + of_errors(faults).errors
+    return Check(errors, findings(message.warnings),
+                 [] if errors else [Remark(one.topic, one.name, one.description)
+                                    for one in message.summary])

@@ -143,11 +143,13 @@ class Client:
 
     def check(self, problem: ProblemLike, data: Optional[Data] = None, *,
               units: Optional[Mapping[str, str]] = None) -> check.Check:
-        """Returns all errors and warnings of a problem, and of data up to the first error."""
-        message = to_message(problem)
-        converter = MeasurementConverter(message, units)
-        return self._transport.run(_calls.check_problem(
-            message, None if data is None else converter.convert(data)))
+        """Returns all errors and warnings of a problem, and of data up to the first error.
+
+        A value of a wrong form in the problem is the only error then. Raises WrongType for what is
+        no problem, and InvalidInput for a file that cannot be read and for wrong `units`.
+        """
+        found = _calls.check_problem(problem, data, units)
+        return found if isinstance(found, check.Check) else self._transport.run(found)
 
     def session(self, name: str, problem: Optional[ProblemLike] = None, *,
                 units: Optional[Mapping[str, str]] = None,

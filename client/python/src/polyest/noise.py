@@ -5,6 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal, Optional, Union
 
+from polyest._request import number
+from polyest._table import refuse
+
 
 @dataclass(frozen=True)
 class Noise:
@@ -28,8 +31,20 @@ class Noise:
     white_share: float = 0.0
     #: What is done about gross errors.
     outliers: Optional[Literal["NONE", "STUDENT_T", "HUBER"]] = None
-    #: The full scale of the sensor, in the output's unit; None: the largest sample so far.
+    #: The full scale of the sensor, in the output's unit, > 0; None: the largest sample so far.
     full_scale: Optional[float] = None
+
+    def __post_init__(self) -> None:
+        """Raises InvalidInput for what a problem file cannot say; the daemon checks the rest."""
+        for name in ("absolute", "relative", "relative_to_max", "white_share"):
+            number(name, getattr(self, name))
+        if self.correlation not in (None, "auto"):
+            number("correlation", self.correlation, 'a number, "auto" or None')
+        if self.full_scale is not None and not number("full_scale", self.full_scale) > 0:
+            raise refuse("full_scale", f"{self.full_scale} must be > 0; None stands for the "
+                         "largest sample so far")
+        if self.white_share and self.correlation is None:
+            raise refuse("white_share", "is a share of correlated noise, and correlation is None")
 
     def as_json(self) -> dict[str, Any]:
         """Returns the noise as it stands in a problem file."""
@@ -39,10 +54,9 @@ class Noise:
                             ("outliers", self.outliers), ("fullScale", self.full_scale)):
             if value:
                 noise[name] = value
-        if self.correlation == "auto":
-            noise["correlation"] = {"auto": True}
-        elif self.correlation is not None:
-            noise["correlation"] = {"timeConstantS": self.correlation}
+        if self.correlation is not None:
+            noise["correlation"] = ({"auto": True} if self.correlation == "auto"
+                                    else {"timeConstantS": self.correlation})
             if self.white_share:
                 noise["correlation"]["whiteShare"] = self.white_share
         return noise

@@ -5,16 +5,16 @@ from __future__ import annotations
 import copy
 import json
 import os
-import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal, Optional, Union
 
 import numpy as np
 from google.protobuf import json_format
 
-from polyest import _strict_json, _wrong_values
+from polyest import _parsing, _strict_json
+from polyest._files import file_error, path_of
 from polyest._proto.v1 import problem_pb2
-from polyest._request import wrong
+from polyest._request import json_of, number, pair
 from polyest.errors import InvalidInput, WrongType
 from polyest.noise import Noise
 from polyest.priors import Prior
@@ -103,15 +103,15 @@ class Problem:
         `drift` makes it a random walk: its rate in the quantity's unit/√s, or the bounds of an
         unknown rate, which is then estimated, too.
         """
-        known = _json_of("prior", prior, "a prior, such as polyest.Uniform(1, 2)")
+        known = json_of("prior", prior, "a prior, such as polyest.Uniform(1, 2)")
         entry: dict[str, Any] = {"name": name, **known}
         if per_run:
             entry["perRun"] = True
         if population:
             entry["population"] = True
         if isinstance(drift, tuple):
-            entry["drift"] = {"randomWalk": {"unknown": True, "lower": drift[0],
-                                             "upper": drift[1]}}
+            lower, upper = pair("drift", drift)
+            entry["drift"] = {"randomWalk": {"unknown": True, "lower": lower, "upper": upper}}
         elif drift is not None:
             entry["drift"] = {"randomWalk": {"stdDevPerSqrtS": drift}}
         self._document.setdefault("uncertain", []).append(entry)
@@ -126,7 +126,8 @@ class Problem:
         """
         entry: dict[str, Any] = {"state": state}
         if isinstance(spectral_density, tuple):
-            entry.update(unknown=True, lower=spectral_density[0], upper=spectral_density[1])
+            lower, upper = pair("spectral_density", spectral_density)
+            entry.update(unknown=True, lower=lower, upper=upper)
         else:
             entry["spectralDensity"] = spectral_density
         self._document.setdefault("processNoise", []).append(entry)
@@ -146,7 +147,7 @@ class Problem:
     def drive(self, name: str, signal: Signal) -> Problem:
         """Says how an input of the model runs over time."""
         self._document.setdefault("inputs", []).append(
-            {"name": name, **_json_of("signal", signal, "a signal, such as polyest.Step(1.0)")})
+            {"name": name, **json_of("signal", signal, "a signal, such as polyest.Step(1.0)")})
         return self
 
     def stream(self, name: str, *, hold: bool = False,
@@ -164,7 +165,7 @@ class Problem:
         `noise` is the standard deviation of its samples in the output's unit, or a `Noise`.
         `column` and `unit` name the column of the data that has it, and that column's unit.
         """
-        sizes = noise if isinstance(noise, Noise) else Noise(absolute=_number("noise", noise))
+        sizes = noise if isinstance(noise, Noise) else Noise(absolute=number("noise", noise))
         self._document.setdefault("measured", []).append(
             {"output": output, "noise": sizes.as_json()})
         return self.column(output, column, unit) if column or unit else self
@@ -205,7 +206,7 @@ class Problem:
         if isinstance(weight, str):
             self._document["regularizationMode"] = weight
         else:
-            self._document["regularization"] = _number("weight", weight)
+            self._document["regularization"] = number("weight", weight)
         return self
 
     def _merge(self, member: str, **values: Any) -> None:
@@ -231,10 +232,16 @@ class Problem:
         return json.dumps(self._document, indent=2, default=_plain)
 
     def save(self, path: Union[str, os.PathLike[str]]) -> None:
-        """Writes the problem file, which the command `polyest` also reads."""
-        # A number is no path: `open` takes it for a descriptor and closes it in the end.
-        with open(os.fspath(path), "w", encoding="utf-8") as file:
-            file.write(self.as_json() + "\n")
+        """Writes the problem file, which the command `polyest` also reads.
+
+        Raises InvalidInput if it cannot be written.
+        """
+        name, text = path_of("path", path), self.as_json() + "\n"
+        try:
+            with open(name, "w", encoding="utf-8") as file:
+                file.write(text)
+        except OSError as error:
+            raise file_error(name, "cannot be written", error) from error
 
     def copy(self) -> Problem:
         """Returns an independent copy."""
@@ -260,40 +267,8 @@ def _plain(value: Any) -> Any:
                     field="problem")
 
 
-def _json_of(argument: str, value: Any, what: str) -> dict[str, Any]:
-    """Returns the JSON object of a prior or a signal. Raises WrongType for anything else."""
-    if isinstance(value, type) or not hasattr(value, "as_json"):
-        raise wrong(argument, value, what)
-    found: dict[str, Any] = value.as_json()
-    return found
-
-
-def _number(argument: str, value: Any) -> float:
-    try:
-        return float(value)
-    except (TypeError, ValueError):
-        raise wrong(argument, value, "a number") from None
-
-
 #: A problem: built, as a problem file's JSON object, or the path of a problem file.
 ProblemLike = Union[Problem, Mapping[str, Any], str, "os.PathLike[str]", problem_pb2.Problem]
-
-
-# Where protobuf says that a field is wrong: with quotes or, in older versions, without.
-_PLACE = re.compile(r'at "?Problem\.?((?:\w+(?:\[[^\]]*\])?\.?)*)')
-_PARENT = re.compile(r"Failed to parse (\w+) field: ")
-_UNKNOWN = re.compile(r'no field named "([^"]*)"')
-
-
-def _refusal(sentence: str) -> tuple[str, str]:
-    """Returns the field that a sentence of protobuf's is about, and the rule that it breaks."""
-    place = _PLACE.search(sentence)
-    field = place[1].rstrip(".") if place else ".".join(_PARENT.findall(sentence))
-    unknown = _UNKNOWN.search(sentence)
-    if unknown:
-        return f"{field}.{unknown[1]}".lstrip("."), "is not a field"
-    rule = _PARENT.split(sentence)[-1]
-    return field, _PLACE.split(rule)[0].rstrip(" .")
 
 
 def _read(path: Union[str, os.PathLike[str]]) -> dict[str, Any]:
@@ -337,14 +312,5 @@ def to_message(problem: ProblemLike) -> problem_pb2.Problem:
     if isinstance(expansion, dict) and expansion.get("order") == "AUTO":
         del expansion["order"]  # what the word means in a problem file
     message = problem_pb2.Problem()
-    try:
-        json_format.ParseDict(document, message)
-    except json_format.ParseError as error:
-        if _UNKNOWN.search(str(error)) is None:
-            wrong_value = _wrong_values.find(document, problem_pb2.Problem.DESCRIPTOR)
-            if wrong_value is not None:
-                field, rule = wrong_value
-                raise InvalidInput(f"{place}{field}: {rule}", field=field, rule=rule) from error
-        field, rule = _refusal(str(error))
-        raise InvalidInput(f"{place}{error}", field=field, rule=rule) from error
+    _parsing.parse(document, message, place)
     return message

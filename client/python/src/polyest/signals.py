@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal, Optional, Union
 
-import numpy as np
 import numpy.typing as npt
+
+from polyest._request import numbers
 
 #: How a signal runs between its knots.
 Interpolation = Literal["LINEAR", "CUBIC", "SHAPE_PRESERVING"]
@@ -93,8 +94,8 @@ class Samples:
 
     def as_json(self) -> dict[str, Any]:
         """Returns the signal as it stands in a problem file."""
-        table: dict[str, Any] = {"timeS": np.asarray(self.time_s, dtype=float).tolist(),
-                                 "value": np.asarray(self.value, dtype=float).tolist()}
+        table: dict[str, Any] = {"timeS": numbers("time_s", self.time_s).tolist(),
+                                 "value": numbers("value", self.value).tolist()}
         return {"table": {**table, **_options(self.hold, self.amplitude, self.interpolation)}}
 
 

@@ -13,6 +13,7 @@ from polyest._measurements import MeasurementConverter, Measurements
 from polyest._proto.v1 import (
     model_service_pb2,
     problem_pb2,
+    problem_service_pb2,
     session_service_pb2,
     status_service_pb2,
 )
@@ -104,10 +105,8 @@ class Client:
     async def check(self, problem: ProblemLike, data: Optional[Data] = None, *,
                     units: Optional[Mapping[str, str]] = None) -> check.Check:
         """Returns all errors and warnings of a problem, and of data up to the first error."""
-        message = to_message(problem)
-        converter = MeasurementConverter(message, units)
-        return await self._transport.run(_calls.check_problem(
-            message, None if data is None else converter.convert(data)))
+        found = _calls.check_problem(problem, data, units)
+        return found if isinstance(found, check.Check) else await self._transport.run(found)
 
     async def session(self, name: str, problem: Optional[ProblemLike] = None, *,
                       units: Optional[Mapping[str, str]] = None,
@@ -167,6 +166,12 @@ class Client:
         """Returns one model. Raises NotFound."""
         return info.model_of(await self._transport.unary(
             _methods.GET_MODEL, model_service_pb2.GetModelRequest(name=f"models/{name}")))
+
+    async def problem_schema(self) -> str:
+        """Returns the JSON Schema of problem files, as text, for editors."""
+        answer = await self._transport.unary(_methods.GET_PROBLEM_SCHEMA,
+                                             problem_service_pb2.GetProblemSchemaRequest())
+        return answer.json_schema
 
     async def status(self) -> info.DaemonStatus:
         """Returns the daemon's version, load and memory."""

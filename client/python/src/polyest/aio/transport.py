@@ -51,7 +51,7 @@ class Transport:
             response: Response = await call(request, metadata=self.options.metadata(),
                                             timeout=self.options.timeout_s)
         except grpc.RpcError as error:
-            raise self.options.error_of(error) from None
+            raise self.options.error_of(error, method.request) from None
         return response
 
     async def run(self, call: Call[Result]) -> Result:
@@ -69,7 +69,7 @@ class Transport:
             async for response in call:
                 yield response
         except grpc.RpcError as error:
-            raise self.options.error_of(error) from None
+            raise self.options.error_of(error, method.request) from None
         finally:
             call.cancel()
 
@@ -86,7 +86,7 @@ class Transport:
             await call.done_writing()
             response: Response = await call
         except grpc.RpcError as error:
-            raise self.options.error_of(error) from None
+            raise self.options.error_of(error, method.request) from None
         finally:
             call.cancel()
         return response

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from polyest._table import refuse
 from polyest.plot import _figure
 
 if TYPE_CHECKING:
@@ -18,10 +19,17 @@ _COST_OF_95 = 1.92
 
 
 def cost(grid: CostGrid) -> Figure:
-    """Draws the total cost above its least value: a curve, or contours even in its logarithm."""
+    """Draws the total cost above its least value: a curve, or contours even in its logarithm.
+
+    Raises InvalidInput if the cost is finite nowhere on the grid.
+    """
+    finite = np.isfinite(grid.total)
+    if not finite.any():
+        raise refuse("grid", "its cost is finite nowhere: the model fails, or the prior's density "
+                     "is 0, at all of its points")
     figure, axes = _figure.panels(1, height=4.0, width=6.0)
     axis = axes[0, 0]
-    excess = grid.total - grid.total[np.isfinite(grid.total)].min()
+    excess = grid.total - grid.total[finite].min()
     first = grid.axes[0]
     axis.set_xlabel(_figure.label(first.parameter, first.unit))
     if len(grid.axes) == 1:
@@ -30,11 +38,11 @@ def cost(grid: CostGrid) -> Figure:
         return figure
     second = grid.axes[1]
     axis.set_ylabel(_figure.label(second.parameter, second.unit))
-    excess[~np.isfinite(excess)] = np.nan  # not drawn
+    excess[~finite] = np.nan  # not drawn
     drawn = axis.contourf(first.value, second.value, np.log10(1 + excess).T, levels=20,
                           cmap="viridis")
     figure.colorbar(drawn, label="log₁₀(1 + cost above its minimum)")
-    row, column = np.unravel_index(np.argmin(grid.total), grid.total.shape)
+    row, column = np.unravel_index(np.nanargmin(excess), excess.shape)
     axis.plot(first.value[row], second.value[column], "+", color="white", markersize=10)
     return figure
 
