@@ -57,6 +57,10 @@ def test_the_daemon_is_asked_about_a_white_share_that_is_estimated(client, probl
     (lambda problem: problem.process_noise("v", (1, "a")), "spectral_density: 'a' of the type str"),
     (lambda problem: problem.drive("force", polyest.Samples(["a"], [1])),
      r"time_s: \['a'\] of the type list must be numbers"),
+    (lambda problem: problem.fix([1]), r"values: \[1\] of the type list must be a dict, numbers"),
+    (lambda _: polyest.Problem.equations(states=None, outputs={}), "states: None of the type None"),
+    (lambda _: polyest.Problem.equations(states={}, outputs={}, tables={"f": [1, 2, 3]}),
+     r"tables.f: \[1, 2, 3\] of the type list must be two lists: places, and the values there"),
     (lambda problem: problem.measure("v", True), "noise: True of the type bool must be a number"),
 ])
 def test_a_value_that_is_no_number_is_named(problem, build, said):
@@ -102,6 +106,24 @@ def test_the_daemon_s_errors_name_arguments(client, problem, rows):
         with pytest.raises(polyest.InvalidInput, match=f"^{argument}: ") as raised:
             call()
         assert raised.value.field == argument
+
+
+def test_what_a_message_cannot_take_is_named(client, problem, rows, tmp_path):
+    file = tmp_path / "kept"
+    with client.session("typed", problem) as session:
+        session.append(rows(0, 20))
+        session.export(file)
+        for call, argument in (
+                (lambda: next(session.predictions(draws=2.5)), "draws"),
+                (lambda: session.predict(times=[1.0], run="first"), "run"),
+                (lambda: client.session(5, problem), "name"),
+                (lambda: client.session("typed", problem, reorder_window_s="long"),
+                 "reorder_window_s"),
+                (lambda: client.import_session(file, 5), "name")):
+            with pytest.raises(polyest.WrongType) as raised:
+                call()
+            assert raised.value.field == argument
+    client.delete_session("typed")
 
 
 def test_errors_about_a_problem_keep_the_names_of_its_file(client, problem, rows):

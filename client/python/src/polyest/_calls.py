@@ -5,13 +5,14 @@ Synchronous and asynchronous clients run the same calls.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Generic, Optional, TypeVar, Union
 
 import numpy.typing as npt
 
-from polyest import _methods, _parsing, check, estimates, results
+from polyest import _methods, _parsing, _session_file, check, estimates, results
 from polyest._measurements import MeasurementConverter
 from polyest._proto.v1 import (
     measurements_pb2,
@@ -20,7 +21,7 @@ from polyest._proto.v1 import (
     session_service_pb2,
     study_service_pb2,
 )
-from polyest._request import json_of, make, number, numbers, wrong
+from polyest._request import json_of, make, mapping, number, numbers, wrong
 from polyest._table import Data
 from polyest.errors import InvalidInput, WrongType
 from polyest.problem import ProblemLike, to_message
@@ -73,6 +74,21 @@ def compute_history(subject: Subject, points: int) -> Call[results.History]:
                 lambda answer: history.of_message(answer.history))
 
 
+def create_session(name: str, problem: problem_pb2.Problem, window_s: Optional[float]
+                   ) -> session_service_pb2.CreateSessionRequest:
+    """The request for a new session."""
+    return make(session_service_pb2.CreateSessionRequest, session_id=name,
+                session=make(session_service_pb2.Session, problem=problem,
+                             reorder_window_s=window_s))
+
+
+def import_session(name: str, file: Union[str, os.PathLike[str]]
+                   ) -> Iterator[session_service_pb2.ImportSessionRequest]:
+    """The requests for a session from a file. Raises InvalidInput while they are made."""
+    for record in _session_file.read(file):
+        yield make(session_service_pb2.ImportSessionRequest, session_id=name, record=record)
+
+
 def get_estimate(session: str, source: Optional[Studies]) -> Call[estimates.Estimate]:
     """The present estimate of a session."""
     return Call(_methods.GET_ESTIMATE, session_service_pb2.GetEstimateRequest(session=session),
@@ -123,20 +139,17 @@ def predict(subject: Subject, *, outputs: Sequence[str], probabilities: Sequence
         first_scored_row=first_scored_row, record=record)
     if times is not None:
         for time_s in numbers("times", times).ravel():
-            request.times.add(run=run, time_s=time_s)
+            request.times.append(make(study_service_pb2.RecordTime, run=run,
+                                      time_s=time_s))
     return Call(_methods.PREDICT, request, prediction.of_message)
 
 
 def watch_predictions(session: str, outputs: Sequence[str], draws: int, max_rows: int,
                       min_interval_s: float) -> session_service_pb2.WatchSessionRequest:
     """The request for estimates of a session with predictions of its record."""
-    request = session_service_pb2.WatchSessionRequest(session=session)
-    policy = request.prediction
-    policy.SetInParent()
-    policy.outputs.extend(outputs)
-    policy.draw_count, policy.max_row_count = draws, max_rows
-    policy.min_interval_s = min_interval_s
-    return request
+    policy = make(session_service_pb2.WatchSessionRequest.PredictionPolicy, outputs=outputs,
+                  draw_count=draws, max_row_count=max_rows, min_interval_s=min_interval_s)
+    return session_service_pb2.WatchSessionRequest(session=session, prediction=policy)
 
 
 def compute_posterior(subject: Subject, *, probabilities: Sequence[float], density_bins: int,
@@ -212,20 +225,15 @@ def compute_design(subject: Subject, *, until_s: float, step_s: float, samples: 
     request = make(
         study_service_pb2.ComputeExperimentDesignRequest, subject=subject, until_s=until_s,
         step_s=step_s, sample_count=samples)
-    for name, inputs in _entries("candidates", candidates, "inputs by name"):
+    for name, inputs in mapping("candidates", candidates, "inputs by name").items():
         candidate = request.candidates.add(name=name)
-        for signal_name, signal in _entries(f"candidates.{name}", inputs, "signals by input"):
+        signals = mapping(f"candidates.{name}", inputs, "signals by input")
+        for signal_name, signal in signals.items():
             candidate.inputs.append(
                 input_of(f"candidates.{name}.{signal_name}", signal_name, signal))
-    for output, noise in _entries("outputs", outputs, "noise by output"):
+    for output, noise in mapping("outputs", outputs, "noise by output").items():
         request.possible.add(output=output).noise.absolute = number(f"outputs.{output}", noise)
     return Call(_methods.COMPUTE_EXPERIMENT_DESIGN, request, design.of_message)
-
-
-def _entries(argument: str, value: Any, what: str) -> Iterable[tuple[str, Any]]:
-    if isinstance(value, Mapping):
-        return value.items()
-    raise wrong(argument, value, f"a dict, {what}")
 
 
 def input_of(path: str, name: str, signal: Signal) -> problem_pb2.Input:

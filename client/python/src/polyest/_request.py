@@ -92,16 +92,20 @@ def json_of(argument: str, value: Any, what: str) -> dict[str, Any]:
     return found
 
 
+def mapping(argument: str, value: Any, what: str = "") -> dict[str, Any]:
+    """Returns a mapping as a dict. Raises WrongType, which names the argument, for another."""
+    if not isinstance(value, Mapping):
+        raise wrong(argument, value, f"a dict{', ' * bool(what)}{what}")
+    return dict(value)
+
+
 def texts(argument: str, values: Any) -> dict[str, str]:
     """Returns a mapping from names to texts, as of units; None is empty. Raises WrongType."""
-    if values is None:
-        return {}
-    if not isinstance(values, Mapping):
-        raise wrong(argument, values, "a dict of texts by name")
-    for name, value in values.items():
+    found = {} if values is None else mapping(argument, values, "texts by name")
+    for name, value in found.items():
         if not isinstance(value, str):
             raise wrong(f"{argument}.{name}", value, "a text")
-    return dict(values)
+    return found
 
 
 def with_arguments(error: PolyestError, request: Descriptor) -> PolyestError:

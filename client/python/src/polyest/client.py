@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping
 from types import TracebackType
 from typing import Any, Optional, TypeVar, Union
 
-from polyest import _calls, _methods, _session_file, check, info, results
+from polyest import _calls, _methods, check, info, results
 from polyest._calls import Call, Subject
 from polyest._connection import ConnectionOptions
 from polyest._measurements import MeasurementConverter, Measurements
@@ -180,9 +180,8 @@ class Client:
             MeasurementConverter(message, units)  # refuses wrong units before there is a session
             try:
                 created = self._transport.unary(
-                    _methods.CREATE_SESSION, session_service_pb2.CreateSessionRequest(
-                        session_id=name, session=session_service_pb2.Session(
-                            problem=message, reorder_window_s=reorder_window_s or 0.0)))
+                    _methods.CREATE_SESSION,
+                    _calls.create_session(name, message, reorder_window_s))
             except AlreadyExists:
                 created = created_or_same(name, message, reorder_window_s,
                                           self._get_session(name))
@@ -207,9 +206,8 @@ class Client:
 
         name: of the new session; by default the one that it had.
         """
-        created = self._transport.client_stream(_methods.IMPORT_SESSION, (
-            session_service_pb2.ImportSessionRequest(session_id=name, record=record)
-            for record in _session_file.read(file)))
+        created = self._transport.client_stream(_methods.IMPORT_SESSION,
+                                                _calls.import_session(name, file))
         return self.session(created.name.rpartition("/")[2])
 
     def models(self) -> dict[str, info.Model]:

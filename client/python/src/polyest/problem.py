@@ -14,7 +14,7 @@ from google.protobuf import json_format
 from polyest import _parsing, _strict_json
 from polyest._files import file_error, path_of
 from polyest._proto.v1 import problem_pb2
-from polyest._request import json_of, number, pair
+from polyest._request import json_of, mapping, number, numbers, pair, wrong
 from polyest.errors import InvalidInput, WrongType
 from polyest.noise import Noise
 from polyest.priors import Prior
@@ -72,16 +72,17 @@ class Problem:
         `parameters` defaults, `units` units by name. A state's initial value is `<state>_0`.
         `tables` has the points of functions of one argument: their places and their values.
         """
-        equations: dict[str, Any] = {"states": dict(states), "outputs": dict(outputs)}
+        equations: dict[str, Any] = {"states": mapping("states", states),
+                                     "outputs": mapping("outputs", outputs)}
         for name, value in (("parameters", parameters), ("units", units),
                             ("intermediates", intermediates)):
             if value:
-                equations[name] = dict(value)
+                equations[name] = mapping(name, value)
         if inputs:
-            equations["inputs"] = list(inputs)
+            equations["inputs"] = [inputs] if isinstance(inputs, str) else list(inputs)
         if tables:
-            equations["tables"] = {name: {"x": list(x), "value": list(value)}
-                                   for name, (x, value) in tables.items()}
+            equations["tables"] = {name: _points(f"tables.{name}", points)
+                                   for name, points in mapping("tables", tables).items()}
         return cls({"model": {"equations": equations}})
 
     @classmethod
@@ -91,7 +92,8 @@ class Problem:
 
     def fix(self, values: Optional[Mapping[str, float]] = None, **named: float) -> Problem:
         """Gives parameters, initial states, … known values, in the model's units."""
-        self._document.setdefault("fixed", {}).update({**(values or {}), **named})
+        known = {} if values is None else mapping("values", values, "numbers by name")
+        self._document.setdefault("fixed", {}).update({**known, **named})
         return self
 
     def uncertain(self, name: str, prior: Prior, *, per_run: bool = False,
@@ -257,6 +259,14 @@ class Problem:
         return (f"<polyest.Problem: {json.dumps(self._document.get('model', {}))[:60]}, "
                 f"uncertain {', '.join(names) or 'none'}, "
                 f"measured {', '.join(measured) or 'none'}>")
+
+
+def _points(argument: str, points: Any) -> dict[str, list[float]]:
+    """Returns the places and values of a table. Raises WrongType."""
+    if not isinstance(points, Sequence) or len(points) != 2:
+        raise wrong(argument, points, "two lists: places, and the values there")
+    places, values = (numbers(argument, one).tolist() for one in points)
+    return {"x": places, "value": values}
 
 
 def _plain(value: Any) -> Any:

@@ -6,7 +6,7 @@ from collections.abc import AsyncIterator, Callable, Mapping
 from types import TracebackType
 from typing import Any, Optional, TypeVar
 
-from polyest import _calls, _methods, _session_file, check, info, results
+from polyest import _calls, _methods, check, info, results
 from polyest._calls import Call, Subject
 from polyest._connection import ConnectionOptions, File
 from polyest._measurements import MeasurementConverter, Measurements
@@ -126,9 +126,8 @@ class Client:
             MeasurementConverter(message, units)  # refuses wrong units before there is a session
             try:
                 created = await self._transport.unary(
-                    _methods.CREATE_SESSION, session_service_pb2.CreateSessionRequest(
-                        session_id=name, session=session_service_pb2.Session(
-                            problem=message, reorder_window_s=reorder_window_s or 0.0)))
+                    _methods.CREATE_SESSION,
+                    _calls.create_session(name, message, reorder_window_s))
             except AlreadyExists:
                 created = created_or_same(name, message, reorder_window_s,
                                           await self._get_session(name))
@@ -151,9 +150,8 @@ class Client:
 
     async def import_session(self, file: File, name: str = "") -> Session:
         """Creates a session from a file of `Session.export` or `polyest export`."""
-        created = await self._transport.client_stream(_methods.IMPORT_SESSION, (
-            session_service_pb2.ImportSessionRequest(session_id=name, record=record)
-            for record in _session_file.read(file)))
+        created = await self._transport.client_stream(_methods.IMPORT_SESSION,
+                                                _calls.import_session(name, file))
         return await self.session(created.name.rpartition("/")[2])
 
     async def models(self) -> dict[str, info.Model]:
