@@ -96,7 +96,7 @@ def test_draws_of_a_population_are_those_of_its_prior(prior, middle, unit):
     assert np.std(drawn["k[3]"] - drawn[middle]) > 1
     for name, lower, upper in (("c.drift", 0.01, 1.0), ("processNoise.v", 1e-4, 1.0)):
         logarithm = np.log(drawn[name] / lower) / np.log(upper / lower)
-        assert 0 <= logarithm.min() and logarithm.max() <= 1
+        assert logarithm.min() >= 0 and logarithm.max() <= 1
         assert abs(logarithm.mean() - 0.5) < 4 / np.sqrt(12 * DRAWS)
 
 
