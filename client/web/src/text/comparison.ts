@@ -12,7 +12,7 @@ export interface Comparison {
   tone: 'good' | 'weak' | 'bad' | 'none';
 }
 
-// Standard deviations of the difference beyond which chance is no likely explanation, and none.
+// Standard deviations of the difference up to which chance explains it, and up to which it still may.
 const LIKELY = 2;
 const POSSIBLE = 3;
 
@@ -26,7 +26,7 @@ function judge(first: Parameter, second: Parameter): Pick<Comparison, 'words' | 
   if (Number.isNaN(ratio)) return { words: 'Cannot be compared.', tone: 'none' };
   const size = `${significant(ratio, 2)} standard deviations apart`;
   if (ratio <= LIKELY) return { words: `They agree: ${size}.`, tone: 'good' };
-  if (ratio <= POSSIBLE) return { words: `Hardly by chance: ${size}.`, tone: 'weak' };
+  if (ratio <= POSSIBLE) return { words: `They may differ: ${size}, seldom by chance.`, tone: 'weak' };
   return { words: `They differ: ${size}.`, tone: 'bad' };
 }
 

@@ -10,6 +10,11 @@ export interface Interval {
   upper: number;
 }
 
+// The standard deviation of the logarithm of a population's spread, and its median in the unit that the
+// prior gives it.
+const SPREAD_DEVIATION = 1;
+const SPREAD_MEDIAN = 0.5;
+
 const isObject = (value: unknown): value is Json => typeof value === 'object' && value !== null;
 const numberAt = (json: Json, key: string): number => Number(json[key] ?? 0);
 
@@ -21,12 +26,25 @@ function fromPrior(entry: Json): Interval | null {
   }
   const lognormal = entry['lognormal'];
   if (isObject(lognormal)) {
-    const [mean, stdDev] = [numberAt(lognormal, 'mean'), numberAt(lognormal, 'stdDev')];
-    const variance = Math.log1p((stdDev / mean) ** 2);
-    const [mu, sigma] = [Math.log(mean) - variance / 2, Math.sqrt(variance)];
-    return { lower: Math.exp(mu - Z * sigma), upper: Math.exp(mu + Z * sigma) };
+    const sigma = deviationOfLogarithm(lognormal);
+    return ofLogarithm(Math.log(numberAt(lognormal, 'mean')) - sigma ** 2 / 2, sigma);
   }
   return null;
+}
+
+const ofLogarithm = (mu: number, sigma: number): Interval => ({ lower: Math.exp(mu - Z * sigma), upper: Math.exp(mu + Z * sigma) });
+
+const deviationOfLogarithm = (lognormal: Json): number =>
+  Math.sqrt(Math.log1p((numberAt(lognormal, 'stdDev') / numberAt(lognormal, 'mean')) ** 2));
+
+// The spread of the runs' values, lognormal: in the unit of the parameter for a normal prior, of its
+// logarithm for a lognormal one, and else of normal scores.
+function ofSpread(population: Json): Interval {
+  const { normal, lognormal } = population;
+  let unit = 1;
+  if (isObject(normal)) unit = numberAt(normal, 'stdDev');
+  else if (isObject(lognormal)) unit = deviationOfLogarithm(lognormal);
+  return ofLogarithm(Math.log(SPREAD_MEDIAN * unit), SPREAD_DEVIATION);
 }
 
 // Bounds within which the parameter lies for certain.
@@ -61,11 +79,16 @@ const isFinite = (interval: Interval | null): interval is Interval =>
 
 export function priorInterval(problem: Json | null, parameter: Parameter): Interval {
   const uncertain = problem?.['uncertain'];
-  const own = parameter.name.replace(/\[\d+\]$/, '');  // "x_0[1]" is x_0 of run 1
-  const entry = Array.isArray(uncertain)
-    ? uncertain.find((each: unknown): each is Json => isObject(each) && each['name'] === own)
-    : undefined;
-  const exact = entry ? fromPrior(entry) : fromBounds(problem, parameter.name);
+  const entries = Array.isArray(uncertain) ? uncertain.filter(isObject) : [];
+  const named = (name: string): Json | undefined => entries.find((each) => each['name'] === name);
+  const ofPopulation = (what: RegExp): Json | undefined => {
+    const found = what.test(parameter.name) ? named(parameter.name.replace(what, '')) : undefined;
+    return found?.['population'] === true ? found : undefined;
+  };
+  const spread = ofPopulation(/\.spread$/);
+  // The name as it is: "K[1]" may be a parameter, and "x_0[1]" x_0 of run 1. A median has the prior stated.
+  const entry = named(parameter.name) ?? named(parameter.name.replace(/\[\d+\]$/, '')) ?? ofPopulation(/\.median$/);
+  const exact = entry ? fromPrior(entry) : spread ? ofSpread(spread) : fromBounds(problem, parameter.name);
   if (isFinite(exact)) return exact;
   const bounds = entry ? boundsOf(entry) : { lower: -Infinity, upper: Infinity };
   const { priorMean, priorStdDev } = parameter;

@@ -48,17 +48,16 @@ describe('trade-offs in words', () => {
 });
 
 describe('the number that stands for a parameter', () => {
-  it('is the most probable value where the distribution is a bell', () => {
+  it('is the most probable value, as the command prints it, whatever the shape', () => {
     expect(shownOf(parameter('k', { map: 10, mean: 10.1, posteriorStdDev: 1.1 }))).toEqual({ value: 10, deviation: 1, isMean: false });
+    expect(shownOf(parameter('k', { map: 36.3, stdDev: 3.1, mean: 41, posteriorStdDev: 4 }))).toEqual({ value: 36.3, deviation: 3.1, isMean: false });
+    expect(shownOf(parameter('k', { map: 0, stdDev: 0.2, mean: 0.3, posteriorStdDev: 0.2, verdict: 'WEAK' })).value).toBe(0);
   });
-  it('is the mean where it is not, or where the data say less than the prior', () => {
-    expect(shownOf(parameter('k', { map: 36.3, stdDev: 3.1, mean: 41, posteriorStdDev: 4 }))).toEqual({ value: 41, deviation: 4, isMean: true });
-    expect(shownOf(parameter('k', { posteriorStdDev: 0.5 })).isMean).toBe(true);
-    expect(shownOf(parameter('k', { map: 0, stdDev: 0.2, mean: 0.3, posteriorStdDev: 0.2 })).value).toBe(0.3);
-    expect(shownOf(parameter('k', { verdict: 'NOT_IDENTIFIED', mean: 9 })).value).toBe(9);
+  it('is the mean where the data say less than the prior', () => {
+    expect(shownOf(parameter('k', { verdict: 'NOT_IDENTIFIED', mean: 9, posteriorStdDev: 4 }))).toEqual({ value: 9, deviation: 4, isMean: true });
   });
   it('is the most probable value of an older daemon that says no more', () => {
-    expect(shownOf(parameter('k', { posteriorStdDev: 0 })).isMean).toBe(false);
+    expect(shownOf(parameter('k', { verdict: 'NOT_IDENTIFIED', posteriorStdDev: 0 })).isMean).toBe(false);
   });
 });
 
@@ -66,7 +65,7 @@ describe('comparison of two sessions', () => {
   const judge = (changes: Parameters<typeof parameter>[1]) => compare([parameter('k')], [parameter('k', changes)])[0];
   it('goes by the standard deviation of the difference', () => {
     expect(judge({ map: 12 })).toMatchObject({ tone: 'good', words: 'They agree: 1.4 standard deviations apart.' });
-    expect(judge({ map: 13.5 })?.tone).toBe('weak');
+    expect(judge({ map: 13.5 })).toMatchObject({ tone: 'weak', words: 'They may differ: 2.5 standard deviations apart, seldom by chance.' });
     expect(judge({ map: 20 })?.tone).toBe('bad');
     expect(judge({ map: NaN })?.tone).toBe('none');
   });
@@ -93,7 +92,28 @@ describe('priors', () => {
     expect(priorInterval(drift, parameter('c.drift')).lower).toBeCloseTo(10 ** -1.95, 6);
     const noise = { processNoise: [{ state: 'v', unknown: true, lower: 1e-4, upper: 1 }] };
     expect(priorInterval(noise, parameter('processNoise.v')).upper).toBeCloseTo(10 ** -0.1, 6);
+    expect(priorInterval({ uncertain: [{ name: 'K[1]', uniform: { lower: 0, upper: 100 } }] }, parameter('K[1]'))).toEqual({ lower: 2.5, upper: 97.5 });
     expect(priorInterval(null, parameter('k')).upper).toBeCloseTo(18.8, 3);
+  });
+});
+
+describe('priors of a population', () => {
+  const interval = (prior: object, name: string, population = true) =>
+    priorInterval({ uncertain: [{ name: 'k', perRun: true, population, ...prior }] }, parameter(name, { priorMean: 3.3, priorStdDev: 4.32 }));
+  it('give a spread about half the prior, lognormal', () => {
+    // exp(log(d/2) ± 1.96): 0.28 … 14.2 for d = 4
+    const normal = interval({ normal: { mean: 40, stdDev: 4 } }, 'k.spread');
+    expect(normal.lower).toBeCloseTo(0.28172, 4);
+    expect(normal.upper).toBeCloseTo(14.198, 2);
+    const score = interval({ uniform: { lower: 0, upper: 100 } }, 'k.spread');
+    expect(score.upper).toBeCloseTo(3.5496, 3);
+    // The logarithm of a lognormal parameter of mean 1 and deviation 1 deviates by √log 2.
+    expect(interval({ lognormal: { mean: 1, stdDev: 1 } }, 'k.spread').upper).toBeCloseTo(3.5496 * Math.sqrt(Math.LN2), 3);
+  });
+  it('give a median the prior that is stated, and a mean the daemon\'s', () => {
+    expect(interval({ uniform: { lower: 0, upper: 100 } }, 'k.median')).toEqual({ lower: 2.5, upper: 97.5 });
+    expect(interval({ normal: { mean: 40, stdDev: 4 } }, 'k.mean').upper).toBeCloseTo(3.3 + 1.96 * 4.32, 3);
+    expect(interval({ normal: { mean: 40, stdDev: 4 } }, 'k.spread', false).lower).toBeCloseTo(3.3 - 1.96 * 4.32, 3);
   });
 });
 
