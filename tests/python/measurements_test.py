@@ -44,8 +44,9 @@ def test_nullable_columns_of_pandas_have_missing_samples():
 
 
 @pytest.mark.parametrize("kind", ["object", "string", "category"])
-def test_a_text_column_of_pandas_is_refused_only_where_it_is_used(kind):
-    texts = pd.Series(["a", None]).astype(kind)
+@pytest.mark.parametrize("text", ["a", "0.5"])
+def test_a_text_column_of_pandas_is_refused_only_where_it_is_used(kind, text):
+    texts = pd.Series([text, None]).astype(kind)
     frame = pd.DataFrame({"t": [0.0, 1.0], "x": [1.0, 2.0], "note": texts})
     with pytest.warns(UserWarning, match="are not used: note"):
         assert values_of(converter().convert(frame)) == {"x": [1.0, 2.0]}

@@ -14,6 +14,7 @@ from google.protobuf.descriptor import Descriptor, FieldDescriptor
 from google.protobuf.message import Message
 
 from polyest._table import refuse
+from polyest._wrong_values import is_repeated
 from polyest.errors import PolyestError, WrongType
 
 Request = TypeVar("Request", bound=Message)
@@ -142,7 +143,7 @@ def make(kind: type[Request], **fields: Any) -> Request:
 
 
 def _is_list(field: FieldDescriptor) -> bool:
-    return field.label == FieldDescriptor.LABEL_REPEATED and field.message_type is None
+    return is_repeated(field) and field.message_type is None
 
 
 def _set(message: Message, field: FieldDescriptor, value: Any) -> None:

@@ -126,11 +126,12 @@ def _array(name: str, values: Any) -> Array:
 def _values_of(series: Any) -> Array:
     """Returns the values of a pandas column; missing numbers of nullable types become NaN.
 
-    Texts stay what they are: `floats` refuses them where the problem takes numbers from them.
+    Texts stay what they are, also those of numbers: `floats` refuses them where they are used.
     """
     values = np.asarray(series)
     nullable = values.dtype == object and str(getattr(series, "dtype", "object")) != "object"
-    if nullable and not _has_zone(values):
+    texts = any(isinstance(value, str) for value in values) if nullable else False
+    if nullable and not texts and not _has_zone(values):
         with contextlib.suppress(TypeError, ValueError):
             values = series.to_numpy(dtype=float, na_value=np.nan)
     return values

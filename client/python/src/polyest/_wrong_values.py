@@ -39,6 +39,13 @@ def find(document: Mapping[str, Any], message: Descriptor,
     return None
 
 
+def is_repeated(field: FieldDescriptor) -> bool:
+    """Whether a field is a list or a map. Versions of protobuf differ in how they say it."""
+    if hasattr(field, "is_repeated"):
+        return bool(field.is_repeated)
+    return bool(field.label == FieldDescriptor.LABEL_REPEATED)
+
+
 def _name(field: FieldDescriptor) -> str:
     name: str = field.camelcase_name
     return name
@@ -51,7 +58,7 @@ def _field(value: Any, field: FieldDescriptor, path: str) -> Optional[tuple[str,
             return path, f"{_shown(value)} must be an object, in braces {{ }}"
         parts = [(f"{path}.{name}", part) for name, part in sorted(value.items())]
         field = entry.fields_by_name["value"]
-    elif field.label == FieldDescriptor.LABEL_REPEATED:
+    elif is_repeated(field):
         if not isinstance(value, (list, tuple)):
             return path, f"{_shown(value)} must be a list, in brackets [ ]"
         parts = [(f"{path}[{number}]", part) for number, part in enumerate(value)]
