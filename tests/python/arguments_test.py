@@ -1,5 +1,7 @@
 """Arguments that cannot be meant: each is refused before it is sent, and the exception names it."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -98,12 +100,17 @@ def test_signals_of_a_design_are_checked_as_those_of_a_problem(client, problem):
 
 def test_the_daemon_s_errors_name_arguments(client, problem, rows):
     experiment = client.experiment(problem, rows(0, 20))
+    session = client.session("with-rows", problem)
+    session.append(rows(0, 20))
     for call, argument in (
             (lambda: experiment.predict(draws=1), "draws"),
             (lambda: experiment.predict(max_rows=-1), "max_rows"),
             (lambda: experiment.sensitivity(-1.0), "until_s"),
+            (lambda: next(session.predictions(draws=1)), "draws"),
+            (lambda: client.session("m", problem, reorder_window_s=-1), "reorder_window_s"),
+            (lambda: experiment.design(1.0, outputs={"q": 1.0}), r"outputs[0]"),
             (lambda: client.session("Not a name", problem), "name")):
-        with pytest.raises(polyest.InvalidInput, match=f"^{argument}: ") as raised:
+        with pytest.raises(polyest.InvalidInput, match=f"^{re.escape(argument)}: ") as raised:
             call()
         assert raised.value.field == argument
 

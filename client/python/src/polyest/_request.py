@@ -6,7 +6,8 @@ import contextlib
 import math
 import operator
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from re import Pattern
 from typing import Any, TypeVar
 
 import numpy as np
@@ -21,11 +22,14 @@ Request = TypeVar("Request", bound=Message)
 
 # The arguments that fill fields of other names.
 _ARGUMENTS = {
-    "session_id": "name",
+    "session_id": "name", "possible": "outputs",
     "draw_count": "draws", "max_row_count": "max_rows", "lag_count": "lags",
     "density_bin_count": "density_bins", "joint_bin_count": "joint_bins",
     "sample_count": "samples", "point_count": "points", "history_point_count": "points",
 }
+
+# The messages within requests whose fields are arguments, too.
+_OF_ARGUMENTS = frozenset(("Session", "PredictionPolicy"))
 
 _KINDS = {
     FieldDescriptor.CPPTYPE_INT32: "a whole number",
@@ -114,14 +118,25 @@ def with_arguments(error: PolyestError, request: Descriptor) -> PolyestError:
 
     The daemon writes them as JSON has them, such as "drawCount" for the argument `draws`.
     """
-    for field in request.fields:
-        argument = _ARGUMENTS.get(field.name, field.name)
-        if field.camelcase_name not in (argument, field.name):
-            word = re.compile(rf"\b{field.camelcase_name}\b")
-            error.args = (word.sub(argument, error.message),)
-            error.field, error.rule = (word.sub(argument, text)
-                                       for text in (error.field, error.rule))
+    for pattern, argument in _named_otherwise(request):
+        error.args = (pattern.sub(argument, error.message),)
+        error.field, error.rule = (pattern.sub(argument, text)
+                                   for text in (error.field, error.rule))
     return error
+
+
+def _named_otherwise(request: Descriptor, parent: str = "") -> Iterator[tuple[Pattern[str], str]]:
+    """Yields how the daemon names the fields whose arguments have other names, and these."""
+    for field in request.fields:
+        json_name = field.camelcase_name
+        argument = _ARGUMENTS.get(field.name, field.name)
+        if json_name == field.name != argument:  # a word that sentences may have, too
+            yield re.compile(rf"^{json_name}\b"), argument
+        elif json_name != argument:
+            yield re.compile(rf"\b{parent}{json_name}\b"), argument
+        inner = field.message_type
+        if not parent and inner is not None and inner.name in _OF_ARGUMENTS:
+            yield from _named_otherwise(inner, rf"(?:{json_name}\.)?")
 
 
 def make(kind: type[Request], **fields: Any) -> Request:
