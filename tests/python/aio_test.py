@@ -7,6 +7,7 @@ import pytest
 
 import polyest
 from polyest import aio
+from polyest.aio.session import Session
 from polyest.aio.stream import MeasurementStream
 
 FAST = polyest.StreamOptions(first_delay_s=0.01, max_delay_s=0.1, max_attempts=1000)
@@ -230,3 +231,15 @@ def test_a_local_daemon_ends_with_its_client(problem):
 
     daemon = asyncio.run(run())
     assert daemon._shell.poll() is not None
+
+
+def test_there_is_what_the_synchronous_clients_have(client):
+    for one, other in ((polyest.Client, aio.Client), (polyest.Session, Session)):
+        missing = [name for name in dir(one) if not name.startswith("_") and not hasattr(other, name)]
+        assert missing == []
+
+    async def schema():
+        async with aio.connect(client.server) as other:
+            return await other.problem_schema()
+
+    assert asyncio.run(schema()) == client.problem_schema()
