@@ -242,14 +242,16 @@ def test_what_cannot_be_meant_is_refused_with_the_rule(data, said):
         converter().convert(data)
 
 
-def test_an_unknown_unit_of_time_names_those_that_are_known():
-    with pytest.raises(polyest.InvalidInput, match="'mm' is no unit of time; known are s, ms"):
-        converter(units={"t": "mm"}).convert({"t": [0.0], "x": [1.0]})
+@pytest.mark.parametrize("unit", ["mm", "Ms"])
+def test_an_unknown_unit_of_time_names_those_that_are_known(unit):
+    with pytest.raises(polyest.InvalidInput, match=f"'{unit}' is no unit of time; known are s, ms"):
+        converter(units={"t": unit}).convert({"t": [0.0], "x": [1.0]})
 
 
 @pytest.mark.parametrize(("unit", "seconds"), [
     ("sec", 1.0), ("MSEC", 1e-3), ("µsec", 1e-6), (" ms ", 1e-3), ("Minuten", 60.0),
-    ("hours", 3600.0)])
+    ("hours", 3600.0),
+    ("S", 1.0)])
 def test_units_of_time_are_spelled_as_measuring_systems_do(unit, seconds):
     found = converter(units={"t": unit}).convert({"t": [0.0, 2.0], "x": [1.0, 1.0]})
     assert list(found.time_s) == [0.0, 2 * seconds]

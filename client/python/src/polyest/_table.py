@@ -31,7 +31,7 @@ _SPELLINGS = {
     "ms": ("msec", "msecs", "millisecond", "milliseconds", "millisekunden"),
     "us": ("usec", "usecs", "µsec", "μsec", "microsecond", "microseconds", "mikrosekunden"),
     "ns": ("nsec", "nsecs", "nanosecond", "nanoseconds", "nanosekunden"),
-    "min": ("mins", "minute", "minutes", "minuten"),
+    "min": ("min", "mins", "minute", "minutes", "minuten"),
     "h": ("hr", "hrs", "hour", "hours", "std", "stunde", "stunden"),
 }
 
@@ -42,9 +42,13 @@ def refuse(field: str, rule: str) -> InvalidInput:
 
 
 def seconds_in(field: str, unit: str) -> float:
-    """Returns the length of a unit of time, s, whatever its case; "" is s. Raises InvalidInput."""
-    word = unit.strip().lower() or "s"
-    known = next((one for one, words in _SPELLINGS.items() if word in words), word)
+    """Returns the length of a unit of time, s; "" is the second. Raises InvalidInput.
+
+    Words may have any case, and symbols capitals throughout: "Ms" is no ms.
+    """
+    given = unit.strip() or "s"
+    symbol = given.lower() if given.isupper() else given
+    known = next((one for one, words in _SPELLINGS.items() if given.lower() in words), symbol)
     if known not in _SECONDS:
         raise refuse(field, f"'{unit}' is no unit of time; known are {', '.join(_SECONDS)}")
     return _SECONDS[known]
