@@ -36,8 +36,10 @@ double CorrectedLag1::Of(const ChannelSums& sums, const ConstVectorRef& d) const
   const double variance = sums.scale_unknown ? sums.samples.ChiSquared(d) / sums.Degrees() : 1;
   if (!(variance > 0)) return 0;
   const double unit = power_ / variance;
+  // A level of m samples has t = 1 and, at the two ends of its run, t_Δ = 2/m.
   const double fitted = unit * TraceOf(sums.samples, spread_) + sums.spent;
-  const double of_differences = unit * TraceOf(sums.differences, spread_);
+  const double of_differences =
+      unit * TraceOf(sums.differences, spread_) + 2 * sums.spent * sums.spent / samples;
   const double lost = (fitted - 0.5 * of_differences - 0.5) / std::max(1.0, samples - fitted);
   return std::clamp(sums.Lag1Correlation(d) + lost, -1.0, 1.0);
 }

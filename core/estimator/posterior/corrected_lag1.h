@@ -27,8 +27,7 @@ class CorrectedLag1 {
   CorrectedLag1(const Cost& cost, const Basis& basis, const ConstVectorRef& eta);
 
   // Returns r of the channel, −1 … 1, at the basis difference d of η, corrected; 0 for fewer than
-  // two samples. Parameters that have been eliminated count as those of predictions that change
-  // little.
+  // two samples. Parameters that have been eliminated count as levels of runs of equal length.
   double Of(const ChannelSums& sums, const ConstVectorRef& d) const;
 
  private:
