@@ -16,7 +16,7 @@
 namespace polyest::internal {
 namespace {
 
-// The expansion of a lighter component has no noticeable effect.
+// What a lighter component says has no noticeable effect.
 constexpr double kMinWeightToWarn = 0.01;
 
 using Places = std::vector<size_t>;
@@ -276,6 +276,36 @@ std::vector<double> WeightsNow(const std::vector<AssessmentRequest>& requests,
   return AreLevel(requests) ? WeightsOf(evidences) : last;
 }
 
+// Whether the draws go beyond what the component's cost says: they are of a tempered likelihood, or
+// have been widened for what contradicts the expansion or the residuals. In an element where the
+// data do not put the parameters, something always does.
+bool IsWidened(const Findings& findings) {
+  return findings.power < 1 || findings.WideningForShift() > 1 || findings.windows.contradicted;
+}
+
+// Returns the indices of the components that affect a result, heaviest first. Those that have been
+// widened must not, as long as all of them that are left out have no noticeable weight: far from
+// the others, their draws would give a mean and a standard deviation of their own.
+std::vector<size_t> RelevantComponents(const std::vector<double>& weights,
+                                       const std::vector<Assessed>& components) {
+  std::vector<size_t> order(weights.size());
+  std::iota(order.begin(), order.end(), size_t{0});
+  std::ranges::stable_sort(order, [&](size_t a, size_t b) { return weights[a] > weights[b]; });
+  double left_out = 0;
+  std::vector<size_t> relevant;
+  for (size_t place = order.size(); place-- > 0;) {
+    const size_t k = order[place];
+    const bool negligible = left_out + weights[k] < kMinWeightToWarn;
+    if (weights[k] < kMinWeight || (negligible && IsWidened(components[k].findings))) {
+      left_out += weights[k];
+    } else {
+      relevant.push_back(k);
+    }
+  }
+  std::ranges::reverse(relevant);
+  return relevant;
+}
+
 // A stop may have left some components before a run with its own parameters and others in it. Then
 // only those with the fewest parameters are kept. Returns the indices of those kept.
 std::vector<size_t> KeepSameProblem(std::vector<AssessmentRequest>& requests) {
@@ -302,22 +332,20 @@ absl::StatusOr<AssessedMixture> AssessMixture(std::vector<AssessmentRequest> req
     return mixture;
   }
   POLYEST_ASSIGN_OR_RETURN(std::vector<Assessed> assessed, AssessAll(requests, places, stop));
-  mixture.order.resize(requests.size());
-  std::iota(mixture.order.begin(), mixture.order.end(), size_t{0});
   const std::vector<double> weights = WeightsNow(requests, assessed);
-  std::ranges::stable_sort(mixture.order,
-                           [&](size_t a, size_t b) { return weights[a] > weights[b]; });
+  mixture.order = RelevantComponents(weights, assessed);
   int reexpansions = 0;
   int64_t trajectories = 0;
   for (const Assessed& one : assessed) {
     reexpansions += one.estimate.expansion.reexpansions;
     trajectories += one.estimate.expansion.trajectories;
   }
-  std::erase_if(mixture.order, [&](size_t k) { return weights[k] < kMinWeight; });
+  double all = 0;
+  for (const size_t k : mixture.order) all += weights[k];
   std::vector<double> in_order;
   std::vector<AssessmentRequest> requests_in_order;
   for (size_t& k : mixture.order) {
-    in_order.push_back(weights[k]);
+    in_order.push_back(weights[k] / all);
     requests_in_order.push_back(requests[k]);
     mixture.components.push_back(std::move(assessed[k]));
     k = places[k];
