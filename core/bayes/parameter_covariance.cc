@@ -80,4 +80,13 @@ Matrix ParameterCovariance(const Prior& prior, const ConstVectorRef& z,
   return covariance;
 }
 
+Matrix PriorCovariance(const Prior& prior) {
+  const Vector deviation = prior.StandardDeviation();
+  if (!prior.correlated()) return deviation.cwiseAbs2().asDiagonal();
+  const Matrix root = prior.factor() * prior.GermStandardDeviation().asDiagonal();
+  const Matrix covariance = ParameterCovariance(prior, Vector::Zero(prior.dimension()), root);
+  const Vector factor = deviation.cwiseQuotient(covariance.diagonal().cwiseSqrt());
+  return factor.asDiagonal() * covariance * factor.asDiagonal();
+}
+
 }  // namespace polyest::internal

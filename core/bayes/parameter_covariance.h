@@ -22,4 +22,7 @@ namespace polyest::internal {
 // Returns the n × n covariance at z (n), for `root` (n × m) with C = root rootᵀ.
 Matrix ParameterCovariance(const Prior& prior, const ConstVectorRef& z, const ConstMatrixRef& root);
 
+// Returns the prior's own covariance of θ (n × n), with the exact variances of the marginals.
+Matrix PriorCovariance(const Prior& prior);
+
 }  // namespace polyest::internal

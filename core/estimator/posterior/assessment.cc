@@ -224,10 +224,10 @@ class Assessment {
         parameter.verdict = Verdict::kWeak;
       }
       DescribeMarginal(posterior_, prior_, i, parameter);
-      GoByPriorIfInaccurate(findings_, prior_, i, parameter);
       estimate_.parameters.push_back(std::move(parameter));
     }
-    DescribeTradeOffs();
+    GoByPriorIfInaccurate(findings_, prior_, estimate_);
+    if (findings_.UsesData()) DescribeTradeOffs();
   }
 
   // Whether nothing speaks against the draws, so that they count where the curvature contradicts

@@ -2,10 +2,25 @@
 
 #include <absl/strings/str_cat.h>
 
+#include "core/bayes/identifiability.h"
+#include "core/bayes/parameter_covariance.h"
 #include "core/bayes/weighted_samples.h"
 #include "core/common/infeasible.h"
 
 namespace polyest::internal {
+namespace {
+
+void DescribeByPrior(const Prior& prior, int i, ParameterEstimate& parameter) {
+  const UncertainParameter& marginal = prior.parameters()[static_cast<size_t>(i)];
+  const Germ germ(marginal.germ);
+  parameter.mean = parameter.prior_mean;
+  parameter.posterior_std_dev = parameter.prior_std_dev;
+  parameter.lower95 = marginal.ToParameter(germ.Quantile(0.025));
+  parameter.upper95 = marginal.ToParameter(germ.Quantile(0.975));
+  parameter.verdict = Verdict::kNotIdentified;
+}
+
+}  // namespace
 
 void DescribeMarginal(const PosteriorDraws& posterior, const Prior& prior, int i,
                       ParameterEstimate& parameter) {
@@ -17,24 +32,35 @@ void DescribeMarginal(const PosteriorDraws& posterior, const Prior& prior, int i
   parameter.upper95 = quantile(0.975);
 }
 
-void GoByPriorIfInaccurate(const Findings& findings, const Prior& prior, int i,
-                           ParameterEstimate& parameter) {
-  const bool unknown = parameter.verdict == Verdict::kNotIdentified ||
-                       parameter.posterior_std_dev > parameter.prior_std_dev;
+void ReplaceDeviation(int i, double std_dev, Estimate& estimate) {
+  ParameterEstimate& parameter = estimate.parameters[static_cast<size_t>(i)];
+  const double ratio = std_dev / parameter.std_dev;
+  parameter.std_dev = std_dev;
+  parameter.contraction = std_dev / parameter.prior_std_dev;
+  estimate.covariance.row(i) *= ratio;
+  estimate.covariance.col(i) *= ratio;
+}
+
+void GoByPriorIfInaccurate(const Findings& findings, const Prior& prior, Estimate& estimate) {
   const bool inaccurate = findings.power < 1 || findings.shift > kInaccurateShift;
-  if (findings.UsesData() && !(unknown && inaccurate)) return;
-  const UncertainParameter& marginal = prior.parameters()[static_cast<size_t>(i)];
-  const Germ germ(marginal.germ);
-  if (!findings.UsesData()) {
-    const Germ modal = prior.WithModesOfUniform().germs()[static_cast<size_t>(i)];
-    parameter.map = prior.OfScore(i, modal.Mode());
+  for (int i = 0; i < prior.dimension(); ++i) {
+    ParameterEstimate& parameter = estimate.parameters[static_cast<size_t>(i)];
+    const bool unknown = parameter.verdict == Verdict::kNotIdentified ||
+                         parameter.posterior_std_dev > parameter.prior_std_dev;
+    if (findings.UsesData() && !(unknown && inaccurate)) continue;
+    ReplaceDeviation(i, parameter.prior_std_dev, estimate);
+    DescribeByPrior(prior, i, parameter);
   }
-  parameter.mean = parameter.prior_mean;
-  parameter.posterior_std_dev = parameter.std_dev = parameter.prior_std_dev;
-  parameter.lower95 = marginal.ToParameter(germ.Quantile(0.025));
-  parameter.upper95 = marginal.ToParameter(germ.Quantile(0.975));
-  parameter.contraction = 1;
-  parameter.verdict = Verdict::kNotIdentified;
+  if (findings.UsesData()) return;
+  const Prior modal = prior.WithModesOfUniform();
+  for (int i = 0; i < prior.dimension(); ++i) {
+    ParameterEstimate& parameter = estimate.parameters[static_cast<size_t>(i)];
+    parameter.map = prior.OfScore(i, modal.germs()[static_cast<size_t>(i)].Mode());
+    parameter.robust_std_dev = 0;
+  }
+  estimate.covariance = PriorCovariance(prior);
+  estimate.directions = Directions(Matrix::Zero(prior.dimension(), prior.dimension()), prior);
+  estimate.trade_offs.clear();
 }
 
 absl::Status CheckFinite(const std::vector<ParameterEstimate>& parameters) {

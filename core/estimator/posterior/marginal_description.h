@@ -17,10 +17,13 @@ namespace polyest::internal {
 void DescribeMarginal(const PosteriorDraws& posterior, const Prior& prior, int i,
                       ParameterEstimate& parameter);
 
-// Sets what is known of parameter i to what its prior says: if the data are not used, and if the
-// expansion is not accurate and would tell less than the prior, or the curvature tells nothing.
-void GoByPriorIfInaccurate(const Findings& findings, const Prior& prior, int i,
-                           ParameterEstimate& parameter);
+// Replaces the standard deviation of parameter i, with its row and column of the covariance.
+void ReplaceDeviation(int i, double std_dev, Estimate& estimate);
+
+// Sets what is known of the parameters to what the prior says, with covariance and directions: of
+// all of them if the data are not used; of a parameter of which an inaccurate expansion would tell
+// less than the prior, or the curvature nothing.
+void GoByPriorIfInaccurate(const Findings& findings, const Prior& prior, Estimate& estimate);
 
 // Returns InfeasibleError that names a parameter whose estimate is not finite, as where ended
 // runs have let the posterior go far from the prior.

@@ -85,8 +85,8 @@ void DescribeWhole(const Prior& prior, const PosteriorDraws& posterior, const Fi
         VerdictOfContraction(contraction) != Verdict::kIdentified) {
       parameter.verdict = Verdict::kWeak;
     }
-    if (!findings.UsesData()) GoByPriorIfInaccurate(findings, prior, i, parameter);
   }
+  if (!findings.UsesData()) GoByPriorIfInaccurate(findings, prior, estimate);
 }
 
 // The curvature at the minimum is that of one component. Where it contradicts the draws of several
@@ -97,16 +97,13 @@ void GoByDraws(Findings& findings, Estimate& estimate) {
                         findings.windows.contradicted || estimate.regularization != 1;
   findings.drawn_to_curvature = Vector::Zero(std::ssize(estimate.parameters));
   for (Eigen::Index i = 0; i < findings.drawn_to_curvature.size(); ++i) {
-    ParameterEstimate& parameter = estimate.parameters[static_cast<size_t>(i)];
+    const ParameterEstimate& parameter = estimate.parameters[static_cast<size_t>(i)];
     const double drawn = std::min(parameter.posterior_std_dev, parameter.prior_std_dev);
     const double ratio = drawn / parameter.std_dev;
     const bool contradicts = ratio >= kContradiction || ratio <= 1 / kContradiction;
     if (doubtful ? ratio <= 1 : !contradicts) continue;
     findings.drawn_to_curvature[i] = ratio;
-    parameter.std_dev = drawn;
-    parameter.contraction = drawn / parameter.prior_std_dev;
-    estimate.covariance.row(i) *= ratio;
-    estimate.covariance.col(i) *= ratio;
+    ReplaceDeviation(static_cast<int>(i), drawn, estimate);
   }
 }
 

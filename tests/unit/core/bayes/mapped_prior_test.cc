@@ -207,6 +207,7 @@ TEST(MappedPrior, CovarianceIsTheClosedForm) {
   EXPECT_NEAR(covariance(2, 3), 40 * std::expm1(-0.5 * c * d), 1e-12);
   EXPECT_NEAR(covariance(0, 2), 0.4 * 2 * 40 * c, 1e-12);
   EXPECT_TRUE(covariance.diagonal().cwiseSqrt().isApprox(prior.StandardDeviation(), 1e-12));
+  EXPECT_TRUE(PriorCovariance(prior).isApprox(covariance, 1e-12));
 }
 
 TEST(MappedPrior, QuadratureOfOtherFamiliesKeepsTheirStandardDeviation) {
@@ -218,6 +219,8 @@ TEST(MappedPrior, QuadratureOfOtherFamiliesKeepsTheirStandardDeviation) {
                 .abs()
                 .maxCoeff(),
             1e-3);
+  EXPECT_TRUE(
+      PriorCovariance(prior).diagonal().isApprox(prior.StandardDeviation().cwiseAbs2(), 1e-12));
 }
 
 // Of a hundred powers of ten the exponential of half the variance would not be a number.

@@ -69,5 +69,15 @@ INSTANTIATE_TEST_SUITE_P(FewSamples, IrrelevantComponents,
                          ::testing::Values(Case{5, 0.3, {0.5}}, Case{2, 0.3, {0.1}},
                                            Case{5, 0.3, {3.0}}, Case{2, 3, {0.9, 1.5}}));
 
+// An expansion over elements too wide for the noise cannot use the datum, and the answer is the
+// prior: in all of its parts.
+TEST(UnusedData, LeaveTheCovarianceOfThePrior) {
+  const Problem problem = TextProblem("a", {UncertainParameter::Lognormal("a", 1, 2).value()}, 0.3);
+  const Estimate estimate = Processed(problem, {3.0})->CurrentEstimate().value();
+  const ParameterEstimate& a = estimate.parameters[0];
+  EXPECT_NEAR(std::sqrt(estimate.covariance(0, 0)), a.std_dev, 1e-12);
+  EXPECT_EQ(estimate.directions[0].verdict, a.verdict);
+}
+
 }  // namespace
 }  // namespace polyest::internal::irrelevant_components_test

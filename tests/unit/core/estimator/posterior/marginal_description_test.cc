@@ -6,6 +6,7 @@
 #include <cmath>
 #include <vector>
 
+#include "core/bayes/identifiability.h"
 #include "core/estimator/problem/logarithmic_germs.h"
 
 namespace polyest::internal::marginal_description_test {
@@ -28,6 +29,16 @@ ParameterEstimate Narrow(const Prior& prior, int i) {
   return parameter;
 }
 
+// Returns an estimate whose parameters have a correlation of −0.9.
+Estimate NarrowEstimate(const Prior& prior) {
+  Estimate estimate;
+  estimate.parameters = {Narrow(prior, 0), Narrow(prior, 1)};
+  estimate.covariance.resize(2, 2);
+  estimate.covariance << 0.01, -0.009, -0.009, 0.01;
+  estimate.directions = Directions(1e4 * Matrix::Identity(2, 2), prior);
+  return estimate;
+}
+
 Findings WithPower(double power) {
   Findings findings;
   findings.power = power;
@@ -36,31 +47,48 @@ Findings WithPower(double power) {
 
 TEST(MarginalDescription, IsThePriorWhereTheDataAreNotUsed) {
   const Prior prior = Mixed();
-  ParameterEstimate k = Narrow(prior, 1);
-  GoByPriorIfInaccurate(WithPower(0.009), prior, 1, k);
+  Estimate estimate = NarrowEstimate(prior);
+  GoByPriorIfInaccurate(WithPower(0.009), prior, estimate);
+  const ParameterEstimate& k = estimate.parameters[1];
   EXPECT_EQ(k.verdict, Verdict::kNotIdentified);
   EXPECT_EQ(k.mean, k.prior_mean);
   EXPECT_EQ(k.std_dev, k.prior_std_dev);
   EXPECT_EQ(k.posterior_std_dev, k.prior_std_dev);
   EXPECT_NEAR(k.lower95, 21, 1e-9);
   EXPECT_NEAR(k.upper95, 59, 1e-9);
-  ParameterEstimate m = Narrow(prior, 0);
-  GoByPriorIfInaccurate(WithPower(0.009), prior, 0, m);
-  EXPECT_NEAR(m.map, std::exp(prior.parameters()[0].location), 1e-12);
+  EXPECT_NEAR(estimate.parameters[0].map, std::exp(prior.parameters()[0].location), 1e-12);
+  const Matrix independent = prior.StandardDeviation().cwiseAbs2().asDiagonal();
+  EXPECT_EQ(estimate.covariance, independent);
+  EXPECT_EQ(estimate.directions[0].information, 0);
+  EXPECT_EQ(estimate.directions[0].verdict, Verdict::kNotIdentified);
 }
 
 TEST(MarginalDescription, IsThatOfTheDrawsWhereTheDataAreUsed) {
   const Prior prior = Mixed();
-  ParameterEstimate k = Narrow(prior, 1);
-  GoByPriorIfInaccurate(WithPower(0.011), prior, 1, k);
+  Estimate estimate = NarrowEstimate(prior);
+  ParameterEstimate& k = estimate.parameters[1];
+  GoByPriorIfInaccurate(WithPower(0.011), prior, estimate);
   EXPECT_EQ(k.verdict, Verdict::kWeak);
   EXPECT_EQ(k.mean, 25);
   k.verdict = Verdict::kNotIdentified;
-  GoByPriorIfInaccurate(WithPower(1), prior, 1, k);
+  GoByPriorIfInaccurate(WithPower(1), prior, estimate);
   EXPECT_EQ(k.mean, 25);
-  GoByPriorIfInaccurate(WithPower(0.5), prior, 1, k);
+  EXPECT_EQ(estimate.covariance, NarrowEstimate(prior).covariance);
+}
+
+// The other parameter keeps its estimate, and their correlation stays.
+TEST(MarginalDescription, IsThePriorOfAParameterThatAnInaccurateExpansionDoesNotKnow) {
+  const Prior prior = Mixed();
+  Estimate estimate = NarrowEstimate(prior);
+  ParameterEstimate& k = estimate.parameters[1];
+  k.verdict = Verdict::kNotIdentified;
+  GoByPriorIfInaccurate(WithPower(0.5), prior, estimate);
   EXPECT_EQ(k.mean, k.prior_mean);
   EXPECT_EQ(k.map, 25);
+  EXPECT_EQ(estimate.parameters[0].mean, 25);
+  EXPECT_EQ(estimate.covariance(0, 0), 0.01);
+  EXPECT_NEAR(std::sqrt(estimate.covariance(1, 1)), k.prior_std_dev, 1e-12);
+  EXPECT_NEAR(estimate.covariance(1, 0), -0.9 * 0.1 * k.prior_std_dev, 1e-12);
 }
 
 TEST(MarginalDescription, IsRefusedIfItIsNotFinite) {

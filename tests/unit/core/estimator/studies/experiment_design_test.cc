@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "core/estimator/estimator_access.h"
+#include "core/estimator/posterior/marginal_description.h"
 #include "core/estimator/studies/information_gain.h"
 #include "core/estimator/studies/sample_times.h"
 #include "core/model/equations/equation_model.h"
@@ -374,6 +375,38 @@ TEST(EstimateAsPrior, KeepsTheBoundsOfALogUniformPrior) {
   const ResolvedProblem after = WithEstimateAsPrior(before, LineEstimate(before, {0.1})).value();
   EXPECT_NEAR(after.prior().OfScore(1, -30), 1, 1e-12);
   EXPECT_NEAR(after.prior().OfScore(1, 30), 3, 1e-12);
+}
+
+// What the estimate reports is the prior, and so is what the next experiment begins with: its gain
+// is that without data.
+TEST(EstimateAsPrior, IsThePriorWhereTheDataCouldNotBeUsed) {
+  Problem problem = ProblemOf({.outputs = {{"y", "a + 0 * b"}}},
+                              {UncertainParameter::Lognormal("a", 1, 2).value(),
+                               UncertainParameter::Lognormal("b", 1, 0.5).value()});
+  problem.correlations = {{"a", "b", 0.5}};
+  problem.measured = {{"y", {.absolute = 0.3}}};
+  const ResolvedProblem before = Resolve(problem);
+  Estimate estimate;
+  for (int i = 0; i < 2; ++i) {
+    ParameterEstimate parameter;
+    parameter.prior_mean = before.prior().Mean()[i];
+    parameter.prior_std_dev = before.prior().StandardDeviation()[i];
+    parameter.map = parameter.mean = 0.5;
+    parameter.std_dev = parameter.posterior_std_dev = 0.1;
+    estimate.parameters.push_back(parameter);
+  }
+  estimate.covariance = 0.01 * Matrix::Identity(2, 2);
+  Findings findings;
+  findings.power = 0.001;
+  GoByPriorIfInaccurate(findings, before.prior(), estimate);
+  const ResolvedProblem next = WithEstimateAsPrior(before, estimate).value();
+  EXPECT_EQ(next.problem().uncertain[0].germ.family, GermFamily::kNormal);
+  EXPECT_EQ(next.prior().factor(), before.prior().factor());
+  ExperimentOptions options;
+  options.until_s = 2;
+  options.step_s = 1;
+  EXPECT_EQ(DesignExperiment(next, options, {})->gain.bits,
+            DesignExperiment(before, options, {})->gain.bits);
 }
 
 }  // namespace
