@@ -120,7 +120,7 @@ void DescribeChannel(const AssessmentRequest& request, const Cost& cost, const V
   const Outliers outliers =
       OutliersAt(*request.expansion, handling, d, c, sums.samples.ChiSquared(d) / mean_square);
   channel.chi_squared = JudgedChiSquared(request, c, outliers, share);
-  channel.lag1_correlation = lag1.Of(sums, d);
+  channel.lag1_correlation = lag1.Of(c);
   DescribeSums(request, eta, d, c, channel);
   channel.noise_time_constant_s = noise.time_constant_s;
   channel.noise_white_share = noise.white_share;
@@ -145,7 +145,7 @@ std::vector<ChannelEstimate> DescribeChannels(const AssessmentRequest& request, 
                                               const Vector& eta, const PosteriorDraws& posterior,
                                               double fitted) {
   const Vector d = cost.BasisDifference(eta);
-  const CorrectedLag1 lag1(cost, *request.expansion->design().basis, eta);
+  const CorrectedLag1 lag1(cost, *request.expansion, eta);
   std::vector<ChannelEstimate> channels;
   for (int c = 0; c < request.problem->channels(); ++c) {
     ChannelEstimate channel;

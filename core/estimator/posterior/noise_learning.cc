@@ -241,7 +241,7 @@ class Revision {
     const RecordSummary::Channel& channel = record_.channels()[static_cast<size_t>(c)];
     const auto samples = static_cast<double>(sums.samples.count());
     if (channel.intervals == 0) return;
-    const double left = CorrectedLag1(cost_, *expansion_.design().basis, eta_).Of(sums, d_);
+    const double left = CorrectedLag1(cost_, expansion_, eta_).Of(c);
     const double present = channel.Correlation(noise);
     const double asked = CorrelationBehind(left, present);
     // The standard error of a correlation a is √((1 − a²)/N).
