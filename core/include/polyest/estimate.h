@@ -118,7 +118,7 @@ struct ChannelEstimate {
   // Root mean square of the noise: as assumed or, where it was unknown, as estimated; in the
   // output's unit.
   double noise_std_dev = 0;
-  double lag1_correlation = 0;   // of the residuals (whitened), −1 … 1, without the bias by the fit
+  double lag1_correlation = 0;   // of the residuals (whitened), −1 … 1, without the fit's bias
   double effective_samples = 0;  // number of independent samples that would tell as much
   double noise_time_constant_s = 0;  // of the noise's correlation; 0: white
   int64_t outliers = 0;              // number of samples with less than half their weight

@@ -27,9 +27,9 @@ inline constexpr int64_t kMaxPoints = 20'000;
 // j_1^q + … + j_n^q ≤ p^q: S terms. They are fitted to Q runs of the model.
 struct ExpansionOptions {
   // p ≥ 1. Without it an adaptive expansion begins with order 3, or with less if order 3 has more
-  // than 250 terms. The order rises, to at most 9 and 500 terms (1,001 at order 4), if the posterior
-  // is so wide that the present order does not follow the model and a higher one does. An expansion
-  // that is not adaptive keeps its first order.
+  // than 250 terms. The order rises, to at most 9 and 500 terms (1,001 at order 4), if the
+  // posterior is so wide that the present order does not follow the model and a higher one does. An
+  // expansion that is not adaptive keeps its first order.
   std::optional<int> order = std::nullopt;
   double hyperbolic_exponent = 1;  // q in (0, 1]; 1 is the total degree
   double points_per_term = 2;  // Q = ⌈points_per_term · S⌉; > 1 when adaptive, ≥ 1 otherwise

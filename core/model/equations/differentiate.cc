@@ -136,28 +136,11 @@ NodeId ChainRule::OfLookup(const Node& node, NodeId da, NodeId db) {
   return Add(sum, Multiply(graph_.Look(Operation::kLookupSlopeY, node.index, x, y), db));
 }
 
-// Returns the nodes that the roots depend on, operands first.
-std::vector<NodeId> Reachable(const Graph& graph, const std::vector<NodeId>& roots) {
-  std::vector<bool> needed(static_cast<size_t>(graph.size()), false);
-  for (const NodeId root : roots) needed[static_cast<size_t>(root)] = true;
-  for (NodeId id = graph.size(); id-- > 0;) {
-    if (!needed[static_cast<size_t>(id)]) continue;
-    for (const NodeId operand : graph.node(id).operands) {
-      if (operand >= 0) needed[static_cast<size_t>(operand)] = true;
-    }
-  }
-  std::vector<NodeId> order;
-  for (NodeId id = 0; id < graph.size(); ++id) {
-    if (needed[static_cast<size_t>(id)]) order.push_back(id);
-  }
-  return order;
-}
-
 }  // namespace
 
 std::vector<NodeId> Differentiate(Graph& graph, const std::vector<NodeId>& roots,
                                   const std::vector<NodeId>& variables) {
-  const std::vector<NodeId> order = Reachable(graph, roots);
+  const std::vector<NodeId> order = graph.Reachable(roots);
   ChainRule chain_rule(graph);
   std::vector<NodeId> derivative(static_cast<size_t>(graph.size()), Graph::kZero);
   std::vector<NodeId> result;

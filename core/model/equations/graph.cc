@@ -200,4 +200,19 @@ NodeId Graph::IntegerPower(NodeId a, int exponent) {
   return exponent % 2 == 0 ? square : Apply(Operation::kMultiply, square, a);
 }
 
+std::vector<NodeId> Graph::Reachable(const std::vector<NodeId>& roots) const {
+  std::vector<bool> reachable(nodes_.size(), false);
+  for (const NodeId root : roots) reachable[static_cast<size_t>(root)] = true;
+  std::vector<NodeId> order;
+  for (NodeId id = size(); id-- > 0;) {
+    if (!reachable[static_cast<size_t>(id)]) continue;
+    order.push_back(id);
+    for (const NodeId operand : node(id).operands) {
+      if (operand >= 0) reachable[static_cast<size_t>(operand)] = true;
+    }
+  }
+  std::ranges::reverse(order);
+  return order;
+}
+
 }  // namespace polyest::internal::equations

@@ -51,6 +51,8 @@ class Graph {
   int size() const { return static_cast<int>(nodes_.size()); }
   const Node& node(NodeId id) const { return nodes_[static_cast<size_t>(id)]; }
   bool IsConstant(NodeId id) const { return node(id).operation == Operation::kConstant; }
+  // Returns the nodes that the roots depend on, and the roots, operands first.
+  std::vector<NodeId> Reachable(const std::vector<NodeId>& roots) const;
 
  private:
   struct Hash {

@@ -23,32 +23,16 @@ bool Switches(Operation operation) {
   }
 }
 
-// Returns the nodes that the roots depend on, operands first.
-std::vector<NodeId> Needed(const Graph& graph, const std::vector<NodeId>& roots) {
-  std::vector<bool> needed(static_cast<size_t>(graph.size()), false);
-  for (const NodeId root : roots) needed[static_cast<size_t>(root)] = true;
-  std::vector<NodeId> order;
-  for (NodeId id = graph.size(); id-- > 0;) {
-    if (!needed[static_cast<size_t>(id)]) continue;
-    order.push_back(id);
-    for (const NodeId operand : graph.node(id).operands) {
-      if (operand >= 0) needed[static_cast<size_t>(operand)] = true;
-    }
-  }
-  std::reverse(order.begin(), order.end());
-  return order;
-}
-
 }  // namespace
 
 bool MaySwitch(const Graph& graph, const std::vector<NodeId>& roots) {
-  const std::vector<NodeId> nodes = Needed(graph, roots);
+  const std::vector<NodeId> nodes = graph.Reachable(roots);
   return std::any_of(nodes.begin(), nodes.end(),
                      [&](NodeId id) { return Switches(graph.node(id).operation); });
 }
 
 bool DependOn(const Graph& graph, const std::vector<NodeId>& roots, NodeId variable) {
-  const std::vector<NodeId> nodes = Needed(graph, roots);
+  const std::vector<NodeId> nodes = graph.Reachable(roots);
   return std::binary_search(nodes.begin(), nodes.end(), variable);
 }
 
@@ -61,7 +45,7 @@ SwitchFreezer::SwitchFreezer(Graph& graph, NodeId time, NodeId frozen_time,
 
 std::vector<NodeId> SwitchFreezer::Freeze(const std::vector<NodeId>& roots, bool add) {
   add_ = add;
-  for (const NodeId id : Needed(graph_, roots)) {
+  for (const NodeId id : graph_.Reachable(roots)) {
     if (rewritten_.contains(id)) continue;
     const Node node = graph_.node(id);
     rewritten_[id] = Operands(node.operation) == 0 ? id : Rewrite(node, id);
