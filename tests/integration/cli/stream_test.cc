@@ -260,13 +260,6 @@ TEST_F(StreamTest, KeepsTheRowsBeforeABadOneAndSaysWhichItIs) {
   ExpectSame(LastEstimate(second.out), EstimateOf(60));
 }
 
-TEST_F(StreamTest, KeepsTheRowsBeforeABadOneInItsFirstBatchToo) {
-  const Finished run = Run(Command("-", {"--session", "rig-1"}), DemoRows(1) + "0.05,many\n");
-  EXPECT_EQ(run.exit_status, 2);
-  EXPECT_THAT(run.err, HasSubstr("standard input:3: column x: \"many\" must be a number; "
-                                 "sessions/rig-1 has kept the row sent before"));
-}
-
 TEST_F(StreamTest, KeepsTheRowsBeforeOneThatTheDaemonRefusesAndSaysWhichItIs) {
   const std::string good = DemoRows(60);
   const std::string bad = DemoRows(52) + "2.65,1e90\n2.7,0\n";
@@ -284,12 +277,6 @@ TEST_F(StreamTest, KeepsTheRowsBeforeOneThatTheDaemonRefusesAndSaysWhichItIs) {
   const Finished second = Run(Command(File("good.csv", good), options));
   ASSERT_EQ(second.exit_status, 0) << second.err;
   ExpectSame(LastEstimate(second.out), EstimateOf(60));
-}
-
-TEST_F(StreamTest, CreatesNoSessionForDataWithoutAnyValidRow) {
-  const Finished run = Run(Command("-", {"--session", "rig-1"}), "t,x\n0,many\n");
-  EXPECT_EQ(run.exit_status, 2);
-  EXPECT_THAT(Run({"list", "--server", daemon_.address()}).out, testing::Not(HasSubstr("rig-1")));
 }
 
 TEST_F(StreamTest, GoesOnWhereItStoodWhenTheDaemonWasKilledAndStartedAgain) {

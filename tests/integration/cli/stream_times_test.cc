@@ -1,4 +1,4 @@
-// Tests what `polyest stream` says of a file's rows and how it takes times that are dates.
+// Tests what `polyest stream` says of the rows of its data and how it takes times that are dates.
 
 #include <gmock/gmock.h>
 
@@ -52,6 +52,19 @@ TEST_F(StreamTimesTest, ResumesWithDatesOnlyFromTheFirstRowOfTheSession) {
   const Finished run = Run(Command(File("d.csv", next), options));
   ASSERT_EQ(run.exit_status, 0) << run.err;
   EXPECT_EQ(ParseEstimate(Lines(run.out).back()).samples(), 6);
+}
+
+TEST_F(StreamTimesTest, KeepsTheRowsBeforeABadOneInItsFirstBatchToo) {
+  const Finished run = Run(Command("-", {"--session", "rig-1"}), DemoRows(1) + "0.05,many\n");
+  EXPECT_EQ(run.exit_status, 2);
+  EXPECT_THAT(run.err, HasSubstr("standard input:3: column x: \"many\" must be a number; "
+                                 "sessions/rig-1 has kept the row sent before"));
+}
+
+TEST_F(StreamTimesTest, CreatesNoSessionForDataWithoutAnyValidRow) {
+  const Finished run = Run(Command("-", {"--session", "rig-1"}), "t,x\n0,many\n");
+  EXPECT_EQ(run.exit_status, 2);
+  EXPECT_THAT(Run({"list", "--server", daemon_.address()}).out, testing::Not(HasSubstr("rig-1")));
 }
 
 }  // namespace
