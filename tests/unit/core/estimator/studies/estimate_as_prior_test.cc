@@ -11,7 +11,7 @@
 #include "core/estimator/studies/experiment_design.h"
 #include "tests/unit/core/estimator/studies/line_experiment.h"
 
-namespace polyest::internal::estimate_as_prior_test {
+namespace polyest::internal::line_experiment {
 namespace {
 
 // Returns the estimate from samples of the line with x_0 = 1, a = 2.
@@ -112,4 +112,4 @@ TEST(EstimateAsPrior, IsThePriorWhereTheDataCouldNotBeUsed) {
 }
 
 }  // namespace
-}  // namespace polyest::internal::estimate_as_prior_test
+}  // namespace polyest::internal::line_experiment

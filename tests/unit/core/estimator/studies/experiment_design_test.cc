@@ -15,7 +15,7 @@
 #include "polyest/estimator.h"
 #include "tests/unit/core/estimator/studies/line_experiment.h"
 
-namespace polyest::internal::experiment_design_test {
+namespace polyest::internal::line_experiment {
 namespace {
 
 using ::testing::AllOf;
@@ -274,4 +274,4 @@ TEST(ExperimentDesign, EndsOnAStopRequest) {
 }
 
 }  // namespace
-}  // namespace polyest::internal::experiment_design_test
+}  // namespace polyest::internal::line_experiment

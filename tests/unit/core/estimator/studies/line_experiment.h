@@ -6,10 +6,10 @@
 #include <utility>
 #include <vector>
 
-#include "core/estimator/problem/resolved_problem.h"
 #include "core/model/equations/equation_model.h"
+#include "tests/unit/core/estimator/studies/resolve.h"
 
-namespace polyest::internal {
+namespace polyest::internal::line_experiment {
 
 inline UncertainParameter Normal(const char* name, double mean, double std_dev) {
   return UncertainParameter::Normal(name, mean, std_dev).value();
@@ -47,8 +47,4 @@ inline double LineBits(const Eigen::Matrix2d& covariance) {
   return 0.5 * std::log2(4 * 9 / covariance.determinant());
 }
 
-inline ResolvedProblem Resolve(Problem problem) {
-  return ResolvedProblem::Make(std::move(problem)).value();
-}
-
-}  // namespace polyest::internal
+}  // namespace polyest::internal::line_experiment

@@ -8,8 +8,8 @@
 #include <string>
 #include <utility>
 
-#include "core/estimator/problem/resolved_problem.h"
 #include "polyest/model.h"
+#include "tests/unit/core/estimator/studies/resolve.h"
 
 namespace polyest::internal::ramp {
 
@@ -56,10 +56,6 @@ inline Problem RampProblem() {
   problem.expansion.order = 2;
   problem.expansion.points_per_term = 4;
   return problem;
-}
-
-inline ResolvedProblem Resolve(Problem problem) {
-  return ResolvedProblem::Make(std::move(problem)).value();
 }
 
 template <class Result>
