@@ -64,7 +64,7 @@ class Executor {
     int running = 0;
     bool in_turn = false;
   };
-  // Is waited on by a thread of the executor while it sleeps.
+  // A thread of the executor sleeps until it is notified here.
   struct Worker {
     std::condition_variable woken;
     bool asleep = false;

@@ -15,8 +15,8 @@ double ModelMismatch(const RegionalExpansion& expansion, const ConstVectorRef& d
 
 // Returns √(β Σ ρ_k/R_k), by Cauchy–Schwarz the largest shift of a posterior mean, in its standard
 // deviations, that the residuals of the expansion at its collocation points allow; β is `power`,
-// that of the likelihood. With filters, β times the error of ½ Σ log(S/σ²) is added, and always
-// that of rounding, which scatters the cost from point to point.
+// that of the likelihood. β times the rounding error of the sums is added, which scatters the cost
+// from point to point, and with filters β times the error of ½ Σ log(S/σ²).
 double LargestShift(const RegionalExpansion& expansion, double power);
 // An expansion whose LargestShift at the power 1 is at most this is as good as the model, all over
 // its region.
@@ -48,7 +48,8 @@ CheckDifferences DifferencesAtChecks(const RegionalExpansion& expansion, const C
 // taken over from an expansion over another region, the check points know nothing; the first bound
 // is increased by √(β Σ ρ_k/R_k) of those, and the second contains it (carry_over.h).
 struct Agreement {
-  double shift = 0;  // the smaller of the available bounds, ≥ 0
+  // The smaller of the available bounds, with β times the rounding error of the sums; ≥ 0.
+  double shift = 0;
   // Mean of ΔJ over the posterior, if the check points determine it to 0.25: the change of the
   // cost's height that the expansion's own error and its discount cause.
   std::optional<double> mean_difference;

@@ -2,18 +2,17 @@
 
 // What a fit takes from the lag-1 correlation r of the residuals, which is to be added to it again.
 //
-// The residuals of a fit are (I − H) u of the errors u, H the projection onto the derivatives c_kᵀ
-// ∂φ of the predictions. For white errors of the variance 1, with the sums of ChannelSums (N
-// samples, the last of which the differences do not hold),
+// The residuals of a fit are (I − H) u, where u are the errors and H projects onto the derivatives
+// c_kᵀ ∂φ of the predictions. For white errors of variance 1 and the sums of ChannelSums, over N
+// samples of one run,
 //
 //   E Σ u_k²            = N − t,        t  = tr(C ∂φᵀ G ∂φ),
 //   E Σ (u_k − u_{k−1})² = 2 N − 1 − t_Δ,  t_Δ = tr(C ∂φᵀ G_Δ ∂φ),
 //
-// to first order in the parameters, where C⁻¹ is the sum of all channels' ∂φᵀ G ∂φ and the prior's
-// precision. So
-// r = 1 − Σ (u_k − u_{k−1})²/(2 Σ u_k²) is too small by (t − t_Δ/2 − ½)/(N − t). Predictions that
-// change little from one sample to the next have t_Δ ≈ 0 and lose t/N; those of an input that is
-// white itself have t_Δ ≈ 2 t and lose nothing.
+// to first order in the parameters. C⁻¹ is the sum of ∂φᵀ G ∂φ over all channels and of the prior's
+// precision. Hence r = 1 − Σ (u_k − u_{k−1})²/(2 Σ u_k²) is too small by (t − t_Δ/2 − ½)/(N − t).
+// Predictions that change little from one sample to the next have t_Δ ≈ 0, and r loses t/N. Those
+// of a white input have t_Δ ≈ 2 t, and r loses nothing.
 
 #include <vector>
 

@@ -9,7 +9,8 @@ constexpr int kFirstOrder = 3;
 constexpr int kLastOrder = 9;
 constexpr int64_t kAffordableTerms = 500;
 // Cubic polynomials seldom follow a model over a wide prior, whatever its dimension. The order
-// above them is therefore affordable with as many terms as it has in ten dimensions.
+// above them is therefore affordable with as many terms as it has in ten dimensions, when they have
+// been tried.
 constexpr int kFourthOrder = 4;
 constexpr int64_t kAffordableAtFourth = 1001;
 // An expansion whose order may still rise must begin well below the maximum.
@@ -34,7 +35,8 @@ std::optional<Truncation> NextTruncation(const ExpansionOptions& options, int di
   for (const int more : {2, 1}) {
     const Truncation next{present.order + more, present.exponent};
     if (next.order > kLastOrder) continue;
-    const int64_t affordable = next.order <= kFourthOrder ? kAffordableAtFourth : kAffordableTerms;
+    const bool cubic_tried = more == 1 && next.order == kFourthOrder;
+    const int64_t affordable = cubic_tried ? kAffordableAtFourth : kAffordableTerms;
     if (TermCount(dimension, next, affordable) <= affordable) return next;
   }
   return std::nullopt;

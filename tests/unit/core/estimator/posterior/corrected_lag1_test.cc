@@ -48,7 +48,7 @@ double MeanLag1(const Problem& problem, int records) {
 }
 
 // Of N − p = 28 degrees of freedom r has a standard deviation of 1/√28, the mean of 32 records
-// that of 1/30. Uncorrected, r is 0.43 too small where low frequencies were fitted, and as much too
+// that of 1/30. Uncorrected, r is 0.35 too small where low frequencies were fitted, and 0.39 too
 // large where high ones were.
 TEST(CorrectedLag1, IsThatOfWhiteErrorsInEveryBand) {
   constexpr int kRecords = 32;

@@ -194,7 +194,7 @@ TEST_P(FewRobustSamples, PassIntoManyThatAreWeighted) {
 // known: the information grows as t⁵. The minimum then moves by half a standard deviation, of which
 // the weights of the old one, too steep by 7/5 (Σ w/Σ ρ″ of Student's t), withhold two sevenths.
 // Two standard deviations of that are 0.28, which also covers how unevenly the samples are spread.
-TEST_P(FewRobustSamples, HaveWeightsOfLateThatTheirMeanAgreesWith) {
+TEST_P(FewRobustSamples, KeepTheirWeightsUpToDate) {
   const std::vector<UncertainParameter> prior = {*UncertainParameter::Normal("a", 0, 1)};
   const Output growing = [](double a, double, double t) { return a * t * t / 10'000; };
   for (uint64_t seed = 1; seed <= 12; ++seed) {

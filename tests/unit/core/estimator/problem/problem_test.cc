@@ -155,7 +155,9 @@ TEST(ResolvedProblem, AnAutomaticOrderRisesAsFarAsThatIsAffordable) {
   EXPECT_FALSE(NextTruncation({}, 1, {9, 1}));
   EXPECT_EQ(NextTruncation({}, 12, {2, 1})->order, 3);  // 455 terms
   EXPECT_FALSE(NextTruncation({}, 12, {3, 1}));         // 1820 of order 4
+  EXPECT_EQ(NextTruncation({}, 10, {2, 1})->order, 3);  // 286 terms
   EXPECT_EQ(NextTruncation({}, 10, {3, 1})->order, 4);  // 1001 terms
+  EXPECT_FALSE(NextTruncation({}, 13, {2, 1}));         // 560 of order 3
   EXPECT_FALSE(NextTruncation({}, 4, {8, 1}));          // 715 of order 9
   EXPECT_FALSE(NextTruncation({.order = 3}, 1, {3, 1}));
 }
