@@ -12,7 +12,7 @@
 #include "core/estimator/studies/cost_grid.h"
 #include "tests/unit/core/estimator/estimation.h"
 
-namespace polyest::internal {
+namespace polyest::internal::priors_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -327,4 +327,4 @@ TEST(TruncatedNormalPriors, RefuseAnOrderTheyHaveNoPolynomialsFor) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::priors_test

@@ -7,7 +7,7 @@
 
 #include "tests/unit/core/estimator/text_problem.h"
 
-namespace polyest::internal {
+namespace polyest::internal::log_density_test {
 namespace {
 
 LogDensityOptions At(const Matrix& points, int derivative_order) {
@@ -139,4 +139,4 @@ TEST(LogDensity, RefusesPointsWithoutOneAndForgetsNothingOlderSamplesSaid) {
 }
 
 }  // namespace
-}  // namespace polyest::internal
+}  // namespace polyest::internal::log_density_test
