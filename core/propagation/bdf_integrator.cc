@@ -9,8 +9,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 
 #include "core/common/check.h"
+#include "core/common/held_exception.h"
 #include "core/propagation/block_vector.h"
 #include "core/propagation/error_floors.h"
 #include "core/propagation/error_scale.h"
@@ -23,6 +25,19 @@ struct VectorDestroyer {
   void operator()(N_Vector vector) const { N_VDestroy(vector); }
 };
 using OwnedVector = std::unique_ptr<_generic_N_Vector, VectorDestroyer>;
+
+struct SolverDestroyer {
+  void operator()(void* memory) const { CVodeFree(&memory); }
+};
+using OwnedSolver = std::unique_ptr<void, SolverDestroyer>;
+
+struct LinearSolverDestroyer {
+  void operator()(SUNLinearSolver solver) const {
+    solver->content = nullptr;  // the integrator, which it does not own
+    SUNLinSolFreeEmpty(solver);
+  }
+};
+using OwnedLinearSolver = std::unique_ptr<_generic_SUNLinearSolver, LinearSolverDestroyer>;
 
 const char* InWords(int flag) {
   switch (flag) {
@@ -64,7 +79,6 @@ class BdfIntegrator final : public BlockIntegrator {
  public:
   BdfIntegrator(BlockSystem* system, double relative_tolerance, double time_s,
                 const ConstBlock& states);
-  ~BdfIntegrator() override;
 
   double time_s() const override { return time_s_; }
   ConstBlock states() const override { return BlockValues(vector()); }
@@ -74,6 +88,8 @@ class BdfIntegrator final : public BlockIntegrator {
   bool RestartFrom(const ConstBlock& states) override;
 
  private:
+  static constexpr int kFailed = -1;  // a callback's failure that no shorter step mends
+
   // Callbacks with this object as user data.
   static int RightHandSide(double time_s, N_Vector states, N_Vector derivatives, void* self);
   static int ErrorWeights(N_Vector states, N_Vector weights, void* self);
@@ -83,7 +99,9 @@ class BdfIntegrator final : public BlockIntegrator {
     return SUNLINEARSOLVER_MATRIX_EMBEDDED;
   }
   static int SolveLinear(SUNLinearSolver solver, SUNMatrix, N_Vector x, N_Vector b, double) {
-    return static_cast<BdfIntegrator*>(solver->content)->SolveNewton(x, b);
+    auto* const integrator = static_cast<BdfIntegrator*>(solver->content);
+    return integrator->held_.Guard(SUNLS_PACKAGE_FAIL_UNREC,
+                                   [&] { return integrator->SolveNewton(x, b); });
   }
 
   int Evolve(double time_s, double stop_time_s, int max_steps);
@@ -94,6 +112,7 @@ class BdfIntegrator final : public BlockIntegrator {
   int SolveNewton(N_Vector x, N_Vector b);
   void UpdateNewtonMatrix(double time_s, const Eigen::ArrayXXd& states, double gamma);
   N_Vector vector() const { return vector_.get(); }
+  void* memory() const { return memory_.get(); }
 
   BlockSystem* const system_;
   sundials::Context context_;
@@ -103,8 +122,9 @@ class BdfIntegrator final : public BlockIntegrator {
   double time_s_;
   double covered_s_;  // dense output reaches to here
   bool first_step_set_ = false;
-  void* memory_ = nullptr;
-  SUNLinearSolver solver_ = nullptr;
+  OwnedLinearSolver linear_solver_;
+  OwnedSolver memory_;
+  HeldException held_;  // of a callback
   NewtonMatrix newton_matrix_;
   double factored_gamma_ = 0;  // 0 before the first factorization
   long differentiated_at_step_ = 0;
@@ -119,49 +139,48 @@ BdfIntegrator::BdfIntegrator(BlockSystem* system, double relative_tolerance, dou
       vector_(NewBlockVector(system->points(), system->states(), &scale_, context_)),
       time_s_(time_s),
       covered_s_(time_s),
+      linear_solver_(SUNLinSolNewEmpty(context_)),
       memory_(CVodeCreate(CV_BDF, context_)),
-      solver_(SUNLinSolNewEmpty(context_)),
       newton_matrix_(system) {
-  POLYEST_CHECK(memory_ != nullptr && solver_ != nullptr);
+  POLYEST_CHECK(memory_ != nullptr && linear_solver_ != nullptr);
   BlockValues(vector()) = states;
   scale_.Grow(BlockValues(vector()));
-  solver_->ops->gettype = LinearSolverType;
-  solver_->ops->solve = SolveLinear;
-  solver_->content = this;
+  linear_solver_->ops->gettype = LinearSolverType;
+  linear_solver_->ops->solve = SolveLinear;
+  linear_solver_->content = this;
   // The first step is a guess, so more rejections are allowed than the defaults of seven and ten.
   constexpr int kMaxFailures = 30;
-  const bool accepted = CVodeSetErrHandlerFn(memory_, IgnoreMessage, nullptr) == CV_SUCCESS &&
-                        CVodeInit(memory_, RightHandSide, time_s, vector()) == CV_SUCCESS &&
-                        CVodeSetUserData(memory_, this) == CV_SUCCESS &&
-                        CVodeWFtolerances(memory_, ErrorWeights) == CV_SUCCESS &&
-                        CVodeSetLinearSolver(memory_, solver_, nullptr) == CV_SUCCESS &&
-                        CVodeSetMaxErrTestFails(memory_, kMaxFailures) == CV_SUCCESS &&
-                        CVodeSetMaxConvFails(memory_, kMaxFailures) == CV_SUCCESS &&
-                        CVodeSetMaxHnilWarns(memory_, -1) == CV_SUCCESS;
+  const bool accepted =
+      CVodeSetErrHandlerFn(memory(), IgnoreMessage, nullptr) == CV_SUCCESS &&
+      CVodeInit(memory(), RightHandSide, time_s, vector()) == CV_SUCCESS &&
+      CVodeSetUserData(memory(), this) == CV_SUCCESS &&
+      CVodeWFtolerances(memory(), ErrorWeights) == CV_SUCCESS &&
+      CVodeSetLinearSolver(memory(), linear_solver_.get(), nullptr) == CV_SUCCESS &&
+      CVodeSetMaxErrTestFails(memory(), kMaxFailures) == CV_SUCCESS &&
+      CVodeSetMaxConvFails(memory(), kMaxFailures) == CV_SUCCESS &&
+      CVodeSetMaxHnilWarns(memory(), -1) == CV_SUCCESS;
   POLYEST_CHECK(accepted);
-}
-
-BdfIntegrator::~BdfIntegrator() {
-  CVodeFree(&memory_);
-  solver_->content = nullptr;
-  SUNLinSolFreeEmpty(solver_);
 }
 
 int BdfIntegrator::RightHandSide(double time_s, N_Vector states, N_Vector derivatives, void* self) {
   auto* const integrator = static_cast<BdfIntegrator*>(self);
-  const Eigen::ArrayXXd& x = BlockValues(states);
-  integrator->scale_.Watch(&x);
-  // A value that is not finite is left to the error norm, which identifies the point and makes the
-  // solver shorten the step.
-  integrator->system_->Derivatives(time_s, x, BlockValues(derivatives));
-  return 0;
+  return integrator->held_.Guard(kFailed, [&] {
+    const Eigen::ArrayXXd& x = BlockValues(states);
+    integrator->scale_.Watch(&x);
+    // A value that is not finite is left to the error norm, which identifies the point and makes
+    // the solver shorten the step.
+    integrator->system_->Derivatives(time_s, x, BlockValues(derivatives));
+    return 0;
+  });
 }
 
 int BdfIntegrator::ErrorWeights(N_Vector states, N_Vector weights, void* self) {
   auto* const integrator = static_cast<BdfIntegrator*>(self);
-  integrator->scale_.Grow(BlockValues(states));
-  BlockValues(weights) = integrator->scale_.weights();
-  return 0;
+  return integrator->held_.Guard(kFailed, [&] {
+    integrator->scale_.Grow(BlockValues(states));
+    BlockValues(weights) = integrator->scale_.weights();
+    return 0;
+  });
 }
 
 IntegratorOutcome BdfIntegrator::Outcome(int flag, double advance_s, double span_s) const {
@@ -190,14 +209,14 @@ IntegratorOutcome BdfIntegrator::AdvanceTo(double time_s, double stop_time_s, in
     const double step_s =
         first_step_set_ && LastStep() > 0 ? LastStep() : floors_.FirstStep(time_s_, x, span_s);
     floors_.Update(time_s_, x, step_s, span_s);
-    if (!first_step_set_) CVodeSetInitStep(memory_, step_s);
+    if (!first_step_set_) CVodeSetInitStep(memory(), step_s);
     first_step_set_ = true;
     // SUNDIALS cannot unset a stop time, so a time that is never reached is used for "none".
     const double stop_s = std::min(stop_time_s, std::numeric_limits<double>::max());
     flag = Evolve(time_s, stop_s, max_steps);
     covered_s_ = std::max(InternalTime(), time_s_);
   } else if (time_s > time_s_) {
-    flag = CVodeGetDky(memory_, time_s, 0, vector());
+    flag = CVodeGetDky(memory(), time_s, 0, vector());
     if (flag >= 0) time_s_ = time_s;
   }
   if (flag >= 0) states = BlockValues(vector());
@@ -205,20 +224,22 @@ IntegratorOutcome BdfIntegrator::AdvanceTo(double time_s, double stop_time_s, in
 }
 
 int BdfIntegrator::Evolve(double time_s, double stop_time_s, int max_steps) {
-  CVodeSetMaxNumSteps(memory_, max_steps);
-  CVodeSetStopTime(memory_, stop_time_s);
-  return CVode(memory_, time_s, vector(), &time_s_, CV_NORMAL);
+  CVodeSetMaxNumSteps(memory(), max_steps);
+  CVodeSetStopTime(memory(), stop_time_s);
+  const int flag = CVode(memory(), time_s, vector(), &time_s_, CV_NORMAL);
+  held_.Rethrow();
+  return flag;
 }
 
 double BdfIntegrator::InternalTime() const {
   double time_s = 0;
-  CVodeGetCurrentTime(memory_, &time_s);
+  CVodeGetCurrentTime(memory(), &time_s);
   return time_s;
 }
 
 double BdfIntegrator::LastStep() const {
   double step_s = 0;
-  CVodeGetLastStep(memory_, &step_s);
+  CVodeGetLastStep(memory(), &step_s);
   return step_s;
 }
 
@@ -227,7 +248,7 @@ void BdfIntegrator::Reset() {
   differentiated_at_step_ = 0;
   convergence_failures_ = 0;
   first_step_set_ = false;  // the solver forgets its step size
-  POLYEST_CHECK(CVodeReInit(memory_, time_s_, vector()) == CV_SUCCESS);
+  POLYEST_CHECK(CVodeReInit(memory(), time_s_, vector()) == CV_SUCCESS);
   covered_s_ = time_s_;
 }
 
@@ -249,8 +270,8 @@ void BdfIntegrator::UpdateNewtonMatrix(double time_s, const Eigen::ArrayXXd& sta
   constexpr double kMaxChange = 0.3;
   long steps = 0;
   long failures = 0;
-  CVodeGetNumSteps(memory_, &steps);
-  CVodeGetNumNonlinSolvConvFails(memory_, &failures);
+  CVodeGetNumSteps(memory(), &steps);
+  CVodeGetNumNonlinSolvConvFails(memory(), &failures);
   const bool differentiate = factored_gamma_ == 0 || failures != convergence_failures_ ||
                              steps >= differentiated_at_step_ + kMaxSteps;
   if (differentiate) {
@@ -268,7 +289,7 @@ int BdfIntegrator::SolveNewton(N_Vector x, N_Vector b) {
   double time_s = 0, gamma = 0, rl1 = 0;
   N_Vector predicted, states, rates, zn1;
   void* user_data;
-  const int flag = CVodeGetNonlinearSystemData(memory_, &time_s, &predicted, &states, &rates,
+  const int flag = CVodeGetNonlinearSystemData(memory(), &time_s, &predicted, &states, &rates,
                                                &gamma, &rl1, &zn1, &user_data);
   if (flag != CV_SUCCESS) return SUNLS_PACKAGE_FAIL_UNREC;
   UpdateNewtonMatrix(time_s, BlockValues(states), gamma);
