@@ -18,6 +18,8 @@ namespace polyest::internal {
 // The statuses as both versions of the standard number them. An FMU may return any other number.
 inline constexpr int kFmuOk = 0, kFmuWarning = 1, kFmuDiscard = 2, kFmuError = 3, kFmuFatal = 4;
 
+inline bool IsGood(int status) { return status == kFmuOk || status == kFmuWarning; }
+
 struct EventUpdate {
   bool again = false;      // whether the discrete states need another iteration
   bool terminate = false;  // whether the FMU requests the end of the simulation
@@ -40,7 +42,6 @@ class Binding {
   // Saves the FMU state. `*state` is null at first; later calls overwrite the saved state.
   virtual int SaveState(void** state) = 0;
   virtual int RestoreState(void* state) = 0;
-  virtual int FreeState(void** state) = 0;
 
   // Functions for Model Exchange.
   virtual int EnterEventMode() = 0;

@@ -99,23 +99,28 @@ bool EventTrajectory::SetPoint(double time_s, N_Vector states) {
 int EventTrajectory::RightHandSide(double time_s, N_Vector states, N_Vector derivatives,
                                    void* self) {
   auto& trajectory = *static_cast<EventTrajectory*>(self);
-  N_VConst(0, derivatives);
-  const std::span<double> rates = trajectory.States(derivatives);
-  if (!trajectory.SetPoint(time_s, states) || !trajectory.instance_->GetDerivatives(rates)) {
+  return trajectory.held_.Guard(kFailed, [&] {
+    N_VConst(0, derivatives);
+    const std::span<double> rates = trajectory.States(derivatives);
     // A value that the FMU discards here may be defined closer to the beginning of the step.
-    return trajectory.instance_->broken() ? -1 : 1;
-  }
-  const auto is_finite = [](double rate) { return std::isfinite(rate); };
-  return std::all_of(rates.begin(), rates.end(), is_finite) ? 0 : 1;
+    constexpr int kTryShorterStep = 1;
+    if (!trajectory.SetPoint(time_s, states) || !trajectory.instance_->GetDerivatives(rates)) {
+      return trajectory.instance_->broken() ? kFailed : kTryShorterStep;
+    }
+    const auto is_finite = [](double rate) { return std::isfinite(rate); };
+    return std::all_of(rates.begin(), rates.end(), is_finite) ? 0 : kTryShorterStep;
+  });
 }
 
 int EventTrajectory::EventIndicators(double time_s, N_Vector states, double* indicators,
                                      void* self) {
   auto& trajectory = *static_cast<EventTrajectory*>(self);
   const auto count = static_cast<size_t>(trajectory.factory_.interface.event_indicators);
-  const bool good = trajectory.SetPoint(time_s, states) &&
-                    trajectory.instance_->GetEventIndicators({indicators, count});
-  return good ? 0 : -1;
+  return trajectory.held_.Guard(kFailed, [&] {
+    const bool good = trajectory.SetPoint(time_s, states) &&
+                      trajectory.instance_->GetEventIndicators({indicators, count});
+    return good ? 0 : kFailed;
+  });
 }
 
 int EventTrajectory::ErrorWeights(N_Vector states, N_Vector weights, void* self) {
@@ -180,6 +185,7 @@ bool EventTrajectory::Integrate(double stop_s, bool& event) {
   while (time_s_ < stop_s && !event) {
     if (++steps_ > max_steps_) return Fail("too many steps between two samples");
     const int flag = CVode(solver_, stop_s, states_, &time_s_, CV_ONE_STEP);
+    held_.Rethrow();
     if (flag < 0) return Fail(flag);
     event = flag == CV_ROOT_RETURN;
     if (factory_.interface.needs_completed_step && !CompleteStep(event)) return false;

@@ -26,10 +26,11 @@
 #include <sundials/sundials_nonlinearsolver.h>
 #include <sundials/sundials_nvector.h>
 
-#include <limits>
 #include <memory>
 #include <string>
 
+#include "core/common/held_exception.h"
+#include "core/common/types.h"
 #include "core/fmu/worker/instance.h"
 #include "core/fmu/worker/pointwise_ensemble.h"
 #include "core/propagation/block_inputs.h"
@@ -47,7 +48,7 @@ class EventTrajectory final : public PointTrajectory {
   PointFailure failure() const override;
 
  private:
-  static constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  static constexpr int kFailed = -1;  // a callback's failure that no shorter step mends
 
   // Callbacks of CVODE; the user data is this object.
   static int RightHandSide(double time_s, N_Vector states, N_Vector derivatives, void* self);
@@ -88,7 +89,8 @@ class EventTrajectory final : public PointTrajectory {
   double since_event_s_ = kInfinity;  // time between the last two events
   double read_s_ = 0;                 // when the outputs were last read
   int close_events_ = 0;
-  int steps_ = 0;  // number since the last sample
+  int steps_ = 0;       // number since the last sample
+  HeldException held_;  // of a callback
   PointFailure failure_;
 };
 

@@ -38,7 +38,6 @@ struct EventInfo {
 using Instantiate = Component(const char* instance, int type, const char* guid,
                               const char* resources_uri, const Callbacks* callbacks,
                               Boolean visible, Boolean logging);
-using FreeInstance = void(Component);
 using SetupExperiment = Status(Component, Boolean tolerance_defined, double tolerance,
                                double start_time, Boolean stop_time_defined, double stop_time);
 using Simple = Status(Component);

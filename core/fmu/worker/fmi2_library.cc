@@ -22,7 +22,6 @@ struct Functions {
   fmi2::SetReal* set_real = nullptr;
   fmi2::GetState* get_state = nullptr;
   fmi2::SetState* set_state = nullptr;
-  fmi2::GetState* free_state = nullptr;
 
   fmi2::Simple* enter_event_mode = nullptr;
   fmi2::NewDiscreteStates* new_discrete_states = nullptr;
@@ -48,8 +47,7 @@ absl::Status BindCommon(const SharedLibrary& library, bool with_state, Functions
   POLYEST_RETURN_IF_ERROR(library.Bind("fmi2SetReal", f.set_real));
   if (!with_state) return absl::OkStatus();
   POLYEST_RETURN_IF_ERROR(library.Bind("fmi2GetFMUstate", f.get_state));
-  POLYEST_RETURN_IF_ERROR(library.Bind("fmi2SetFMUstate", f.set_state));
-  return library.Bind("fmi2FreeFMUstate", f.free_state);
+  return library.Bind("fmi2SetFMUstate", f.set_state);
 }
 
 absl::Status BindModelExchange(const SharedLibrary& library, Functions& f) {
@@ -116,7 +114,7 @@ class Fmi2Binding final : public Binding {
 
   int EnterInitialization(double tolerance) override {
     const int status = f_.setup_experiment(component_, 1, tolerance, 0, 0, 0);
-    return status > kFmuWarning ? status : f_.enter_initialization(component_);
+    return IsGood(status) ? f_.enter_initialization(component_) : status;
   }
   int ExitInitialization() override { return f_.exit_initialization(component_); }
   int Set(std::span<const FmuVariable> variables, const double* values) override {
@@ -127,7 +125,6 @@ class Fmi2Binding final : public Binding {
   }
   int SaveState(void** state) override { return f_.get_state(component_, state); }
   int RestoreState(void* state) override { return f_.set_state(component_, state); }
-  int FreeState(void** state) override { return f_.free_state(component_, state); }
 
   int EnterEventMode() override { return f_.enter_event_mode(component_); }
   int UpdateDiscreteStates(EventUpdate& update) override {

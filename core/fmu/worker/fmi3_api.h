@@ -24,7 +24,6 @@ using InstantiateCoSimulation = Instance(const char* instance, const char* token
                                          bool event_mode_used, bool early_return_allowed,
                                          const Reference* intermediate_variables, size_t count,
                                          void* environment, Log* log, void* intermediate_update);
-using FreeInstance = void(Instance);
 using EnterInitializationMode = Status(Instance, bool tolerance_defined, double tolerance,
                                        double start_time, bool stop_time_defined, double stop_time);
 using Simple = Status(Instance);

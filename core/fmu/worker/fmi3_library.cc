@@ -20,7 +20,6 @@ struct Functions {
   fmi3::Set<float>* set_float32 = nullptr;
   fmi3::GetState* get_state = nullptr;
   fmi3::SetState* set_state = nullptr;
-  fmi3::GetState* free_state = nullptr;
 
   fmi3::Simple* enter_event_mode = nullptr;
   fmi3::UpdateDiscreteStates* update_discrete_states = nullptr;
@@ -45,8 +44,7 @@ absl::Status BindCommon(const SharedLibrary& library, bool with_state, Functions
   POLYEST_RETURN_IF_ERROR(library.Bind("fmi3SetFloat32", f.set_float32));
   if (!with_state) return absl::OkStatus();
   POLYEST_RETURN_IF_ERROR(library.Bind("fmi3GetFMUState", f.get_state));
-  POLYEST_RETURN_IF_ERROR(library.Bind("fmi3SetFMUState", f.set_state));
-  return library.Bind("fmi3FreeFMUState", f.free_state);
+  return library.Bind("fmi3SetFMUState", f.set_state);
 }
 
 absl::Status BindModelExchange(const SharedLibrary& library, Functions& f) {
@@ -100,7 +98,6 @@ class Fmi3Binding final : public Binding {
   int Get(std::span<const FmuVariable> variables, double* values) override;
   int SaveState(void** state) override { return f_.get_state(instance_, state); }
   int RestoreState(void* state) override { return f_.set_state(instance_, state); }
-  int FreeState(void** state) override { return f_.free_state(instance_, state); }
 
   int EnterEventMode() override { return f_.enter_event_mode(instance_); }
   int UpdateDiscreteStates(EventUpdate& update) override {
@@ -138,7 +135,7 @@ class Fmi3Binding final : public Binding {
     const int status = f_.do_step(instance_, time_s, step_s, true, &event_needed, &terminate,
                                   &early_return, &last_time_s);
     // A step that ended early without permission counts as not done.
-    return early_return && status < kFmuDiscard ? kFmuDiscard : status;
+    return early_return && IsGood(status) ? kFmuDiscard : status;
   }
 
  private:
@@ -146,6 +143,19 @@ class Fmi3Binding final : public Binding {
     references_.clear();
     for (const FmuVariable& variable : variables) references_.push_back(variable.reference);
     return references_.data();
+  }
+  // Calls `access` for one variable after the other. Returns the first status that is not good, or
+  // the worst one.
+  template <class Access>
+  static int ForEachVariable(std::span<const FmuVariable> variables, const Access& access) {
+    int worst = kFmuOk;
+    for (size_t i = 0; i < variables.size(); ++i) {
+      const fmi3::Reference reference = variables[i].reference;
+      const int status = access(i, &reference);
+      if (!IsGood(status)) return status;
+      worst = std::max(worst, status);
+    }
+    return worst;
   }
   static bool AllFloat64(std::span<const FmuVariable> variables) {
     return std::none_of(variables.begin(), variables.end(),
@@ -163,15 +173,11 @@ int Fmi3Binding::Set(std::span<const FmuVariable> variables, const double* value
   if (AllFloat64(variables)) {
     return f_.set_float64(instance_, References(variables), count, values, count);
   }
-  int worst = 0;
-  for (size_t i = 0; i < count; ++i) {
-    const fmi3::Reference reference = variables[i].reference;
+  return ForEachVariable(variables, [&](size_t i, const fmi3::Reference* reference) {
     const auto single = static_cast<float>(values[i]);
-    worst = std::max(worst, variables[i].is_float32
-                                ? f_.set_float32(instance_, &reference, 1, &single, 1)
-                                : f_.set_float64(instance_, &reference, 1, &values[i], 1));
-  }
-  return worst;
+    return variables[i].is_float32 ? f_.set_float32(instance_, reference, 1, &single, 1)
+                                   : f_.set_float64(instance_, reference, 1, &values[i], 1);
+  });
 }
 
 int Fmi3Binding::Get(std::span<const FmuVariable> variables, double* values) {
@@ -179,18 +185,15 @@ int Fmi3Binding::Get(std::span<const FmuVariable> variables, double* values) {
   if (AllFloat64(variables)) {
     return f_.get_float64(instance_, References(variables), count, values, count);
   }
-  int worst = 0;
-  for (size_t i = 0; i < count; ++i) {
-    const fmi3::Reference reference = variables[i].reference;
-    if (variables[i].is_float32) {
-      float single = 0;
-      worst = std::max(worst, f_.get_float32(instance_, &reference, 1, &single, 1));
-      values[i] = single;
-    } else {
-      worst = std::max(worst, f_.get_float64(instance_, &reference, 1, &values[i], 1));
+  return ForEachVariable(variables, [&](size_t i, const fmi3::Reference* reference) {
+    if (!variables[i].is_float32) {
+      return f_.get_float64(instance_, reference, 1, &values[i], 1);
     }
-  }
-  return worst;
+    float single = 0;
+    const int status = f_.get_float32(instance_, reference, 1, &single, 1);
+    values[i] = single;
+    return status;
+  });
 }
 
 class Fmi3Library final : public FmuLibrary {

@@ -13,8 +13,6 @@ namespace {
 
 constexpr int kMaxEventIterations = 1'000;
 
-bool IsGood(int status) { return status == kFmuOk || status == kFmuWarning; }
-
 const char* StatusInWords(int status) {
   switch (status) {
     case kFmuDiscard:
@@ -62,7 +60,7 @@ bool Instance::Instantiate() {
   if (shares) {
     if (own_ != nullptr) factory_.shared = std::move(own_);
     binding_ = factory_.shared.get();
-    if (factory_.untouched == nullptr && binding_->SaveState(&factory_.untouched) > kFmuWarning) {
+    if (factory_.untouched == nullptr && !IsGood(binding_->SaveState(&factory_.untouched))) {
       return Fail(kFmuError, "the FMU could not save its state");
     }
   }
@@ -74,14 +72,15 @@ bool Instance::Instantiate() {
 // before.
 bool Instance::Activate() {
   if (factory_.shared == nullptr || factory_.active == this) return true;
+  factory_.said.clear();
   factory_.monitor->Enter(FmuCall::kState, time_s_);
   Instance* const other = factory_.active;
   factory_.active = nullptr;
-  if (other != nullptr && !other->broken_ && binding_->SaveState(&other->state_) > kFmuWarning) {
+  if (other != nullptr && !other->broken_ && !IsGood(binding_->SaveState(&other->state_))) {
     other->Fail(kFmuError, "the FMU could not save its state");
   }
   void* const state = state_ == nullptr ? factory_.untouched : state_;
-  if (binding_->RestoreState(state) > kFmuWarning) {
+  if (!IsGood(binding_->RestoreState(state))) {
     return Fail(kFmuError, "the FMU could not restore its state");
   }
   factory_.active = this;
