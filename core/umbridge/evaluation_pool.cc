@@ -4,6 +4,7 @@
 #include <absl/strings/str_format.h>
 
 #include <algorithm>
+#include <system_error>
 #include <utility>
 
 #include "core/common/status.h"
@@ -50,7 +51,7 @@ absl::StatusOr<std::vector<Evaluation>> EvaluationPool::Evaluate(size_t count, R
   for (size_t i = 0; i < count; ++i) job->waiting.push_back(i);
   job->left = count;
   std::unique_lock lock(mutex_);
-  StartWorkers();
+  POLYEST_RETURN_IF_ERROR(StartWorkers());
   if (jobs_.empty()) {
     // What happened before the pause says nothing of now.
     for (Server& server : servers_) server = {.url = server.url};
@@ -58,12 +59,13 @@ absl::StatusOr<std::vector<Evaluation>> EvaluationPool::Evaluate(size_t count, R
   jobs_.push_back(job);
   work_.notify_all();
   absl::Status status;
-  while (job->left > 0 && status.ok()) {
-    answer_.wait_for(lock, kLook, [&] { return job->left == 0; });
+  while (job->left > 0 && !job->thrown && status.ok()) {
+    answer_.wait_for(lock, kLook, [&] { return job->left == 0 || job->thrown; });
     status = stop.Check();
     if (status.ok()) status = CheckServers();
   }
   jobs_.remove(job);
+  if (job->left > 0 && job->thrown) std::rethrow_exception(job->thrown);
   if (job->left > 0) return status;
   std::vector<Evaluation> results;
   for (Point& point : job->points) results.push_back(std::move(point.result));
@@ -71,21 +73,26 @@ absl::StatusOr<std::vector<Evaluation>> EvaluationPool::Evaluate(size_t count, R
 }
 
 // Starts the threads with the first job, so that a model that nobody uses costs none.
-void EvaluationPool::StartWorkers() {
-  if (!workers_.empty()) return;
-  for (Server& server : servers_) {
+absl::Status EvaluationPool::StartWorkers() {
+  if (!workers_.empty()) return absl::OkStatus();
+  workers_.reserve(servers_.size() * static_cast<size_t>(options_.requests_per_server));
+  try {
     for (int i = 0; i < options_.requests_per_server; ++i) {
-      Worker& worker = workers_.emplace_back();
-      worker.server = &server;
-      worker.connection = std::make_unique<Connection>(server.url, options_.timeout_s);
+      for (Server& server : servers_) {
+        Worker worker{std::make_unique<Connection>(server.url, options_.timeout_s), {}};
+        Connection* const connection = worker.connection.get();
+        worker.thread = std::thread([this, &server, connection] { Work(server, *connection); });
+        workers_.push_back(std::move(worker));
+      }
+    }
+  } catch (const std::system_error& refusal) {
+    // The system allows no more threads: those that there are compute the points.
+    if (workers_.empty()) {
+      return absl::UnavailableError(
+          absl::StrCat("no thread can be started to reach a server: ", refusal.what()));
     }
   }
-  for (Worker& worker : workers_) {
-    worker.thread =
-        std::thread([this, server = worker.server, connection = worker.connection.get()] {
-          Work(*server, *connection);
-        });
-  }
+  return absl::OkStatus();
 }
 
 void EvaluationPool::Work(Server& server, Connection& connection) {
@@ -101,19 +108,32 @@ void EvaluationPool::Work(Server& server, Connection& connection) {
       jobs_.empty() ? work_.wait(lock) : void(work_.wait_for(lock, kLook));
       continue;
     }
-    const Clock::time_point since = Clock::now();
-    Point& point = task->job->points[task->point];
-    if (point.computations++ == 0) {
-      point.computed_by = &server;
-      point.since = since;
-    }
-    lock.unlock();
-    const HttpReply reply = connection.Post("/Evaluate", task->job->request_of(task->point));
-    lock.lock();
-    Finish(server, *task, reply, since);
+    Compute(server, connection, *task, lock);
   }
   ++ended_workers_;
   answer_.notify_all();
+}
+
+void EvaluationPool::Compute(Server& server, Connection& connection, const Task& task,
+                             std::unique_lock<std::mutex>& lock) {
+  Job& job = *task.job;
+  const Clock::time_point since = Clock::now();
+  Point& point = job.points[task.point];
+  if (point.computations++ == 0) {
+    point.computed_by = &server;
+    point.since = since;
+  }
+  try {
+    lock.unlock();
+    const HttpReply reply = connection.Post("/Evaluate", job.request_of(task.point));
+    lock.lock();
+    Finish(server, task, reply, since);
+  } catch (...) {
+    // It ends the job, whose caller is told, and not the process.
+    if (!lock.owns_lock()) lock.lock();
+    job.thrown = std::current_exception();
+    answer_.notify_all();
+  }
 }
 
 std::optional<EvaluationPool::Task> EvaluationPool::Take(const Server& server) {

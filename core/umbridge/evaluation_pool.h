@@ -16,6 +16,7 @@
 #include <chrono>
 #include <condition_variable>
 #include <deque>
+#include <exception>
 #include <functional>
 #include <list>
 #include <memory>
@@ -46,7 +47,8 @@ class EvaluationPool {
   ~EvaluationPool();
 
   // Writes the i-th request for /Evaluate whenever it is sent: from any thread, at once with
-  // others, and even after Evaluate has returned. The same one each time.
+  // others, and even after Evaluate has returned. The same one each time. What it throws ends
+  // Evaluate.
   using RequestOf = std::function<std::string(size_t)>;
 
   // Returns what came of each of `count` requests, in their order. Returns Cancelled or
@@ -82,19 +84,22 @@ class EvaluationPool {
     size_t left = 0;  // points that are not done
     Clock::duration computed{};
     int answers = 0;
+    std::exception_ptr thrown;  // while one of its points was computed
   };
   struct Task {
     std::shared_ptr<Job> job;
     size_t point = 0;
   };
   struct Worker {
-    Server* server = nullptr;
     std::unique_ptr<Connection> connection;
     std::thread thread;
   };
 
-  void StartWorkers();
+  absl::Status StartWorkers();
   void Work(Server& server, Connection& connection);
+  // Computes a point and takes what comes of it. The mutex, which `lock` holds, is free meanwhile.
+  void Compute(Server& server, Connection& connection, const Task& task,
+               std::unique_lock<std::mutex>& lock);
   std::optional<Task> Take(const Server& server);
   std::optional<Task> TakeWaiting();
   std::optional<Task> TakeSlow(const Server& server) const;

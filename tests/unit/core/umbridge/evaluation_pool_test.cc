@@ -14,6 +14,7 @@
 #include <mutex>
 #include <optional>
 #include <set>
+#include <stdexcept>
 #include <stop_token>
 #include <string>
 #include <thread>
@@ -254,6 +255,14 @@ TEST(EvaluationPool, EndsOnAStopRequestAndServesTheNextCaller) {
             absl::StatusCode::kCancelled);
   ExpectSquares(Squares(pool, 5), 5);
   end.set_value();
+}
+
+TEST(EvaluationPool, PassesOnWhatARequestThrowsAndServesTheNextCaller) {
+  ModelServer server(Square);
+  EvaluationPool pool({.urls = {server.url()}});
+  const auto throws = [](size_t) -> std::string { throw std::runtime_error("out of order"); };
+  EXPECT_THROW(pool.Evaluate(3, throws, Stop()).IgnoreError(), std::runtime_error);
+  ExpectSquares(Squares(pool, 5), 5);
 }
 
 }  // namespace
