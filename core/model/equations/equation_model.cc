@@ -254,10 +254,11 @@ SwitchingPrograms Assembly::CompileSwitching(const std::vector<Lookup>& tables) 
   SwitchingPrograms programs{
       freezer.kinds(), false, compile(derivatives), compile(outputs), compile(freezer.arguments()),
       compile(slopes)};
-  // The arguments are part of the right-hand sides, but not of those whose modes are frozen.
+  // The arguments of the switches may depend on the time where the frozen derivatives do not.
   const NodeId time = names_.at("t");
   programs.changes_at_rest = !read_.inputs.empty() || DependOn(graph_, derivatives_, time);
-  for (const Program* program : {&programs.derivatives, &programs.outputs, &programs.slopes}) {
+  for (const Program* program :
+       {&programs.derivatives, &programs.outputs, &programs.arguments, &programs.slopes}) {
     if (program->registers() > kMaxRegisters) return {};
   }
   return programs;

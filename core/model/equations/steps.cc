@@ -38,8 +38,8 @@ class StepMaker {
   void TakeReciprocals();
   NodeId ReciprocalOf(NodeId divisor);
   void Fuse();
-  bool Draw(NodeId sum, Operation operation, NodeId product, NodeId other);
-  bool MayDraw(NodeId outer, NodeId inner);
+  bool FuseProduct(NodeId sum, Operation operation, NodeId product, NodeId other);
+  bool MayFuse(NodeId outer, NodeId inner);
   void FormPairs();
   void FormPair(NodeId id, int position);
 
@@ -120,18 +120,19 @@ void StepMaker::Fuse() {
     if (!step(id).needed) continue;
     const NodeId a = step(id).operands[0], b = step(id).operands[1];
     if (step(id).operation == Operation::kAdd) {
-      Draw(id, Operation::kMultiplyAdd, a, b) || Draw(id, Operation::kMultiplyAdd, b, a);
+      FuseProduct(id, Operation::kMultiplyAdd, a, b) ||
+          FuseProduct(id, Operation::kMultiplyAdd, b, a);
     } else if (step(id).operation == Operation::kSubtract) {
-      Draw(id, Operation::kSubtractMultiplied, b, a) ||
-          Draw(id, Operation::kMultiplySubtract, a, b);
+      FuseProduct(id, Operation::kSubtractMultiplied, b, a) ||
+          FuseProduct(id, Operation::kMultiplySubtract, a, b);
     }
   }
 }
 
 // Fuses `product` into `sum`: makes `sum` the operation on the factors of `product` and the other
 // term. Returns false if `product` is not a product or must be computed by itself.
-bool StepMaker::Draw(NodeId sum, Operation operation, NodeId product, NodeId other) {
-  if (step(product).operation != Operation::kMultiply || !MayDraw(sum, product)) return false;
+bool StepMaker::FuseProduct(NodeId sum, Operation operation, NodeId product, NodeId other) {
+  if (step(product).operation != Operation::kMultiply || !MayFuse(sum, product)) return false;
   const NodeId a = step(product).operands[0], b = step(product).operands[1];
   step(sum).operation = operation;
   step(sum).operands[0] = a;
@@ -142,7 +143,7 @@ bool StepMaker::Draw(NodeId sum, Operation operation, NodeId product, NodeId oth
 
 // Returns whether what `outer` reads need not be computed by itself: it has no other uses, and is
 // not kept from run to run.
-bool StepMaker::MayDraw(NodeId outer, NodeId inner) {
+bool StepMaker::MayFuse(NodeId outer, NodeId inner) {
   return step(inner).uses == 1 && (!step(inner).of_parameters || step(outer).of_parameters);
 }
 
@@ -158,9 +159,8 @@ void StepMaker::FormPairs() {
 // Lets one instruction compute the operand at a position, too, if there is a kernel for that.
 void StepMaker::FormPair(NodeId id, int position) {
   Step& outer = step(id);
-  const NodeId drawn = outer.operands[position];
-  const Step& inner = step(drawn);
-  if (inner.inner.has_value() || !MayDraw(id, drawn)) return;
+  const Step& inner = step(outer.operands[position]);
+  if (inner.inner.has_value() || !MayFuse(id, outer.operands[position])) return;
   // The terms of a sum and the factors of a product may change places.
   const int at = position == 1 && outer.operation != Operation::kSubtract ? 0 : position;
   if (SelectPair(inner.operation, outer.operation, at) == nullptr) return;
