@@ -94,6 +94,16 @@ void FillRadicalInverses(int base, const std::vector<int>& permutation, VectorRe
 
 constexpr int kPlainDimensions = 3;
 
+// Returns the points of the unit cube mapped by each germ's quantile function.
+Matrix MappedPoints(PointSet set, const std::vector<Germ>& germs, int count) {
+  Matrix points = UnitCubePoints(set, static_cast<int>(germs.size()), count);
+  for (Eigen::Index k = 0; k < points.cols(); ++k) {
+    const Germ& germ = germs[static_cast<size_t>(k)];
+    for (double& coordinate : points.col(k)) coordinate = germ.Quantile(coordinate);
+  }
+  return points;
+}
+
 absl::StatusOr<Matrix> GaussTensor(const std::vector<Germ>& germs, int order, int max_points) {
   const Eigen::Index side = order + 1, n = static_cast<Eigen::Index>(germs.size());
   Eigen::Index count = 1;
@@ -133,16 +143,15 @@ Matrix UnitCubePoints(PointSet set, int dimension, int count) {
   return points;
 }
 
+Matrix HaltonDraws(const std::vector<Germ>& germs, int count) {
+  return MappedPoints(PointSet::kHalton, germs, count);
+}
+
 absl::StatusOr<Matrix> CollocationPoints(PointSet set, const std::vector<Germ>& germs, int order,
                                          int count, int max_points) {
   POLYEST_CHECK(!germs.empty() && order >= 0);
   if (set == PointSet::kGaussTensor) return GaussTensor(germs, order, max_points);
-  Matrix points = UnitCubePoints(set, static_cast<int>(germs.size()), count);
-  for (Eigen::Index k = 0; k < points.cols(); ++k) {
-    const Germ& germ = germs[static_cast<size_t>(k)];
-    for (double& coordinate : points.col(k)) coordinate = germ.Quantile(coordinate);
-  }
-  return points;
+  return MappedPoints(set, germs, count);
 }
 
 }  // namespace polyest::internal

@@ -27,6 +27,10 @@ namespace polyest::internal {
 // it 5. The primes 2, 3 and 5 are not permuted, so few dimensions give Halton's own points.
 Matrix UnitCubePoints(PointSet set, int dimension, int count);
 
+// Returns the first `count` points of Halton's sequence mapped by each germ's quantile function,
+// count × n: draws of the germs that are spread evenly.
+Matrix HaltonDraws(const std::vector<Germ>& germs, int count);
+
 // Returns collocation points in germ coordinates, Q × n: unit-cube points mapped by each germ's
 // quantile function, or the tensor grid of the (order + 1)-point Gauss rules of the germs' own
 // polynomials; then `count` is ignored and Q = (order + 1)^n. Returns RESOURCE_EXHAUSTED if the

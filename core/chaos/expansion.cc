@@ -30,8 +30,7 @@ Vector Expansion::Evaluate(const ConstVectorRef& xi) const {
 
 Matrix Expansion::Sample(int count) const {
   constexpr Eigen::Index kDrawsAtATime = 1024;  // bounds the memory for the basis
-  const Matrix draws =
-      CollocationPoints(PointSet::kHalton, basis_->germs(), basis_->order(), count).value();
+  const Matrix draws = HaltonDraws(basis_->germs(), count);
   Matrix samples(count, coefficients_.cols());
   Matrix phi;
   for (Eigen::Index first = 0; first < count; first += kDrawsAtATime) {

@@ -305,10 +305,38 @@ double Germ::NormalScore(double xi) const {
 
 namespace {
 
+// Hermite for the weight e^(−ξ²/2): a_k = 0, b_k = k.
+RecurrenceCoefficients HermiteRecurrence(int count) {
+  RecurrenceCoefficients result{Vector::Zero(count), Vector::Ones(count)};
+  for (int k = 1; k < count; ++k) result.b[k] = k;
+  return result;
+}
+
+// Legendre for a constant weight: a_k = 0, b_k = k²/(4k² − 1).
+RecurrenceCoefficients LegendreRecurrence(int count) {
+  RecurrenceCoefficients result{Vector::Zero(count), Vector::Ones(count)};
+  for (int k = 1; k < count; ++k) {
+    const double square = static_cast<double>(k) * k;
+    result.b[k] = square / (4 * square - 1);
+  }
+  return result;
+}
+
+// Laguerre for the weight ξ^(α−1) e^(−ξ): a_k = 2k + α, b_k = k (k + α − 1).
+RecurrenceCoefficients LaguerreRecurrence(double alpha, int count) {
+  RecurrenceCoefficients result{Vector::Zero(count), Vector::Ones(count)};
+  for (int k = 0; k < count; ++k) {
+    result.a[k] = 2.0 * k + alpha;
+    if (k > 0) result.b[k] = k * (k + alpha - 1);
+  }
+  return result;
+}
+
 // Jacobi for the weight (1 − ξ)^A (1 + ξ)^B, A = β − 1, B = α − 1:
 //   a_k = (B² − A²) / ((2k+A+B)(2k+A+B+2)),
 //   b_k = 4k(k+A)(k+B)(k+A+B) / ((2k+A+B)² (2k+A+B+1)(2k+A+B−1)).
-void JacobiRecurrence(double alpha, double beta, RecurrenceCoefficients& result) {
+RecurrenceCoefficients JacobiRecurrence(double alpha, double beta, int count) {
+  RecurrenceCoefficients result{Vector::Zero(count), Vector::Ones(count)};
   const double a = beta - 1, b = alpha - 1;
   for (Eigen::Index i = 0; i < result.a.size(); ++i) {
     const double k = static_cast<double>(i);
@@ -319,30 +347,28 @@ void JacobiRecurrence(double alpha, double beta, RecurrenceCoefficients& result)
       result.b[i] = 4 * k * (k + a) * (k + b) * (k + a + b) / (c * c * (c + 1) * (c - 1));
     }
   }
+  return result;
 }
 
 }  // namespace
 
 RecurrenceCoefficients Germ::Recurrence(int count) const {
   POLYEST_CHECK(count >= 1);
-  RecurrenceCoefficients result{Vector::Zero(count), Vector::Ones(count)};
-  if (family_ == GermFamily::kBeta) {
-    JacobiRecurrence(first_shape_, second_shape_, result);
-    return result;
+  switch (family_) {
+    case GermFamily::kNormal:
+      return HermiteRecurrence(count);
+    case GermFamily::kUniform:
+      return LegendreRecurrence(count);
+    case GermFamily::kBeta:
+      return JacobiRecurrence(first_shape_, second_shape_, count);
+    case GermFamily::kGamma:
+      return LaguerreRecurrence(first_shape_, count);
+    case GermFamily::kTruncatedNormal:
+      return TruncatedNormalRecurrence(first_shape_, second_shape_, count);
+    case GermFamily::kExponential:
+      return ExponentialRecurrence(first_shape_, count);
   }
-  if (family_ == GermFamily::kTruncatedNormal) {
-    return TruncatedNormalRecurrence(first_shape_, second_shape_, count);
-  }
-  if (family_ == GermFamily::kExponential) return ExponentialRecurrence(first_shape_, count);
-  for (int k = 0; k < count; ++k) {
-    const double kk = k;
-    if (family_ == GermFamily::kGamma) result.a[k] = 2 * kk + first_shape_;
-    if (k == 0) continue;
-    if (family_ == GermFamily::kNormal) result.b[k] = kk;
-    if (family_ == GermFamily::kUniform) result.b[k] = kk * kk / (4 * kk * kk - 1);
-    if (family_ == GermFamily::kGamma) result.b[k] = kk * (kk + first_shape_ - 1);
-  }
-  return result;
+  return {};
 }
 
 }  // namespace polyest::internal
