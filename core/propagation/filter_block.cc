@@ -65,6 +65,7 @@ FilterBlock::FilterBlock(const EnsembleSpecification& specification, const Input
       gain_variance_(members),
       spread_(members),
       whitened_(members),
+      log_variance_(members),
       quadrature_(members),
       scan_(members, std::max<Eigen::Index>(kScanned, 2 * points_.cols())),
       scanned_(scan_),

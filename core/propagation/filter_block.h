@@ -152,7 +152,8 @@ class FilterBlock {
   const Eigen::ArrayXXd* all_outputs_ = nullptr;  // of the points, as read last
   Eigen::ArrayXd outputs_, noise_variance_, innovation_, variance_;
   HeavyTail tail_;
-  Eigen::ArrayXd gain_variance_, spread_, whitened_;  // as it gives them, by member
+  Eigen::ArrayXd gain_variance_, spread_;   // as it gives them, by member
+  Eigen::ArrayXd whitened_, log_variance_;  // ν/√S and log(S/σ²) of a sample, by member
   OutputQuadrature quadrature_;
   Eigen::ArrayXXd scan_, scanned_;          // s and the outputs there, members × points on a line
   Eigen::ArrayXd shift_, mean_, squeezed_;  // μ, E and V, by member

@@ -47,8 +47,8 @@ void FilterBlock::Update(const FilterSamples& samples, Eigen::Index sample, int 
     } else {
       UpdateNormal(z, sigma);
     }
-    innovation.segment(first_member_, members) = innovation_;
-    log_variance.segment(first_member_, members) = variance_;
+    innovation.segment(first_member_, members) = whitened_;
+    log_variance.segment(first_member_, members) = log_variance_;
   }
   for (int i = 0; i < members; ++i) {
     if (alive_[static_cast<size_t>(i)]) continue;
@@ -57,7 +57,7 @@ void FilterBlock::Update(const FilterSamples& samples, Eigen::Index sample, int 
   }
 }
 
-// Leaves the whitened innovations in innovation_ and log(S/σ²) in variance_.
+// Sets the whitened innovations and log(S/σ²).
 void FilterBlock::UpdateNormal(double z, double sigma) {
   gaussians_.Update(outputs_, z, noise_variance_, innovation_, variance_);
   if (backward_) {
@@ -66,20 +66,19 @@ void FilterBlock::UpdateNormal(double z, double sigma) {
   }
   // Roots and logarithms of a vector may differ in the last bit from those of a number, so they
   // are taken in memory of one alignment.
-  innovation_ /= variance_.sqrt();
-  variance_ = (variance_ / (sigma * sigma)).log();
+  whitened_ = innovation_ / variance_.sqrt();
+  log_variance_ = (variance_ / (sigma * sigma)).log();
 }
 
 // As UpdateNormal, with noise of Student's t distribution.
 void FilterBlock::UpdateTailed(double z, double sigma) {
   variance_.setZero();
   gaussians_.Compare(outputs_, z, innovation_, variance_);
-  whitened_ = innovation_;
   for (Eigen::Index i = 0; i < innovation_.size(); ++i) {
     const HeavyTail::Result result =
         tail_.Take(innovation_[i], variance_[i], std::sqrt(noise_variance_[i]), sigma);
     whitened_[i] = result.innovation;
-    variance_[i] = result.log_variance;
+    log_variance_[i] = result.log_variance;
     gain_variance_[i] = result.gain_variance;
     noise_variance_[i] = result.noise_variance;
     spread_[i] = result.spread;
@@ -89,7 +88,6 @@ void FilterBlock::UpdateTailed(double z, double sigma) {
     backward_->AddSample(outputs_, innovation_, gain_variance_, spread_, factor_before_,
                          gaussians_.factor());
   }
-  innovation_ = whitened_;
 }
 
 // Reads the channel's outputs at m + L u s for the first `count` columns of s.
@@ -156,7 +154,6 @@ void FilterBlock::UpdateCurved(int channel, double z, double sigma) {
   for (Eigen::Index i = 0; i < member_count(); ++i) TakeIntegral(i, z, sigma, IsTailed(channel));
   gaussians_.Squeeze(mean_, squeezed_);
   if (backward_) AddCurvedSample();
-  innovation_ = whitened_;
 }
 
 // Turns u to the gradient, sets shift_ to μ, and adds V_d to noise_variance_: what the outputs at
@@ -191,7 +188,7 @@ void FilterBlock::FindLine(int channel) {
 // Sets E, V, w and l of one member. Where there is no integral, these are the filter's own.
 void FilterBlock::TakeIntegral(Eigen::Index member, double z, double sigma, bool tailed) {
   if (!alive_[static_cast<size_t>(member)]) {
-    mean_[member] = whitened_[member] = variance_[member] = 0;
+    mean_[member] = whitened_[member] = log_variance_[member] = 0;
     squeezed_[member] = 1;
     return;
   }
@@ -205,11 +202,11 @@ void FilterBlock::TakeIntegral(Eigen::Index member, double z, double sigma, bool
   if (found) {
     mean_[member] = quadrature_.Mean(member);
     squeezed_[member] = quadrature_.Variance(member);
-    variance_[member] = quadrature_.Deviance(member) - result.innovation * result.innovation;
+    log_variance_[member] = quadrature_.Deviance(member) - result.innovation * result.innovation;
   } else {
     mean_[member] = slope * error / result.gain_variance;
     squeezed_[member] = std::max(0.0, 1 - slope * slope / result.spread);
-    variance_[member] = result.log_variance;
+    log_variance_[member] = result.log_variance;
   }
 }
 

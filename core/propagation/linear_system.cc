@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <variant>
 #include <vector>
 
 #include "core/model/input_generator.h"
+#include "core/propagation/block_rows.h"
 
 namespace polyest::internal {
 namespace {
@@ -113,15 +113,6 @@ bool IsLinear(const StateSpaceModel& model, const EnsembleSpecification& specifi
   return model.IsLinear(zero, constant);
 }
 
-// Returns the points of the specification, followed by copies of the last one up to a multiple of
-// kLanes.
-std::vector<int> AllPoints(const EnsembleSpecification& specification) {
-  const auto points = static_cast<int>(specification.parameters.rows());
-  std::vector<int> rows(static_cast<size_t>((points + kLanes - 1) / kLanes * kLanes), points - 1);
-  std::iota(rows.begin(), rows.begin() + points, 0);
-  return rows;
-}
-
 }  // namespace
 
 bool StepsExactly(const EnsembleSpecification& specification, const InputSignals& inputs) {
@@ -140,7 +131,7 @@ bool StepsExactly(const EnsembleSpecification& specification, const InputSignals
     }
   }
   if (!IsLinear(*model, specification, inputs)) return false;
-  const std::vector<int> rows = AllPoints(specification);
+  const std::vector<int> rows = PaddedRows(static_cast<int>(specification.parameters.rows()));
   const LinearSystem system =
       LinearSystemOf(*model, specification.parameters(rows, Eigen::all).array(), inputs,
                      BlockInputs(specification, &inputs, rows));

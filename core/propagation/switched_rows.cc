@@ -57,14 +57,18 @@ SwitchedRows::Interval SwitchedRows::Bounds(Eigen::Index row, Eigen::Index which
   return mode < 0 ? Interval{-kInfinity, 0} : Interval{0, kInfinity};
 }
 
-void SwitchedRows::Rates(const Eigen::ArrayXd& times_s, const Eigen::ArrayXXd& states,
-                         Eigen::ArrayXXd& rates) {
-  modes_.values.col(0) = times_s;
+void SwitchedRows::ReadInputs(const Eigen::Ref<const Eigen::ArrayXd>& times_s) {
   for (Eigen::Index i = 0; i < inputs_.cols(); ++i) {
     for (Eigen::Index row = 0; row < inputs_.rows(); ++row) {
       inputs_(row, i) = inputs_of_rows_->At(row, i, times_s(row));
     }
   }
+}
+
+void SwitchedRows::Rates(const Eigen::ArrayXd& times_s, const Eigen::ArrayXXd& states,
+                         Eigen::ArrayXXd& rates) {
+  modes_.values.col(0) = times_s;
+  ReadInputs(times_s);
   const ConstBlock modes = modes_.values, x = states, theta = *parameters_, u = inputs_;
   model_->FrozenDerivatives({modes, x, theta, u}, rates);
   for (Eigen::Index row = 0; row < rates.rows(); ++row) {
@@ -92,11 +96,7 @@ void SwitchedRows::RatesOfRow(Eigen::Index row, double time_s, const ConstBlock&
 void SwitchedRows::Observe(const Eigen::ArrayXd& times_s, const Eigen::ArrayXXd& states,
                            Eigen::ArrayXXd& observed) {
   modes_.values.col(0) = times_s;
-  for (Eigen::Index i = 0; i < inputs_.cols(); ++i) {
-    for (Eigen::Index row = 0; row < inputs_.rows(); ++row) {
-      inputs_(row, i) = inputs_of_rows_->At(row, i, times_s(row));
-    }
-  }
+  ReadInputs(times_s);
   const ConstBlock modes = modes_.values, x = states, theta = *parameters_, u = inputs_;
   model_->Arguments({modes, x, theta, u}, observed);
   for (Eigen::Index row = 0; row < observed.rows(); ++row) {
@@ -217,11 +217,7 @@ void SwitchedRows::Outputs(double time_s, const ConstBlock& states, const Modes&
                            Block outputs) {
   output_modes_ = modes.values;
   output_modes_.col(0).setConstant(time_s);
-  for (Eigen::Index i = 0; i < inputs_.cols(); ++i) {
-    for (Eigen::Index row = 0; row < inputs_.rows(); ++row) {
-      inputs_(row, i) = inputs_of_rows_->At(row, i, time_s);
-    }
-  }
+  ReadInputs(output_modes_.col(0));
   const ConstBlock sigma = output_modes_, theta = *parameters_, u = inputs_;
   model_->FrozenOutputs({sigma, states, theta, u}, outputs);
   for (Eigen::Index row = 0; row < outputs.rows(); ++row) {

@@ -109,7 +109,8 @@ class SwitchedRows final : public RowSystem {
     Status status;
   };
 
-  SwitchingPoint Point(const Eigen::ArrayXd& times_s, const Eigen::ArrayXXd& states);
+  // Sets inputs_ to those of each row at its own time.
+  void ReadInputs(const Eigen::Ref<const Eigen::ArrayXd>& times_s);
   void GatherSliding(const Modes& modes, Eigen::Index row);
   void Gather(Eigen::Index which, double mode, double argument, double tolerance);
   void Analyse(Eigen::Index row, double time_s, const ConstBlock& states, const Modes& modes);

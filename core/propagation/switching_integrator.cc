@@ -28,6 +28,7 @@ SwitchingIntegrator::SwitchingIntegrator(const SwitchingModel* model,
       below_(first_rates_),
       times_s_(states.rows()),
       lengths_s_(states.rows()),
+      modes_of_row_(modes->cols()),
       smooth_from_s_(time_s) {
   const Eigen::Index switches = switched_.switches();
   POLYEST_CHECK(modes->rows() == rows() && modes->cols() == switches);
@@ -101,13 +102,13 @@ void SwitchingIntegrator::RenewFloors() {
 // Writes the row's rates at these states with the lower mode of every switch that slides.
 void SwitchingIntegrator::RatesBelow(Eigen::Index row, double time_s,
                                      const Eigen::ArrayXXd& states) {
-  const SwitchedRows::Modes modes = switched_.modes();
   for (Eigen::Index i = 0; i < switched_.switches(); ++i) {
-    switched_.Decode(row, i, modes.values(row, 1 + i));
+    modes_of_row_(i) = switched_.Encoded(switched_.modes(), row, i);
+    switched_.Decode(row, i, switched_.modes().values(row, 1 + i));
   }
   switched_.RatesOfRow(row, time_s, states, below_);
   for (Eigen::Index i = 0; i < switched_.switches(); ++i) {
-    switched_.Decode(row, i, switched_.Encoded(modes, row, i));
+    switched_.Decode(row, i, modes_of_row_(i));
   }
 }
 

@@ -90,6 +90,7 @@ class SwitchingIntegrator final : public BlockIntegrator {
 
   // Work space.
   Eigen::ArrayXd times_s_, lengths_s_;
+  Eigen::ArrayXd modes_of_row_;  // encoded
 
   bool begun_ = false;
   bool restart_ = false;
