@@ -37,7 +37,7 @@ struct Gaussian {
 
   Matrix Draw(int count) const {
     const std::vector<Germ> germs(static_cast<size_t>(mean.size()), Germ::Normal());
-    const Matrix normal = CollocationPoints(PointSet::kHalton, germs, 0, count).value();
+    const Matrix normal = HaltonDraws(germs, count);
     return (normal * factor.transpose()).rowwise() + mean.transpose();
   }
 };

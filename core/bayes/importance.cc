@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "core/bayes/differential_evolution.h"
+#include "core/bayes/weighted_samples.h"
 #include "core/chaos/collocation_points.h"
 #include "core/common/check.h"
 #include "core/common/linear_algebra.h"
@@ -39,7 +40,7 @@ struct Proposal {
 // sequence are themselves low-discrepancy points.
 Proposal MakeProposal(int dimension, int points) {
   const std::vector<Germ> germs(static_cast<size_t>(dimension), Germ::Normal());
-  Proposal proposal{CollocationPoints(PointSet::kHalton, germs, 0, points).value(), {}};
+  Proposal proposal{HaltonDraws(germs, points), {}};
   ScaleAsProposal(proposal.points);
   proposal.log_density = ProposalLogDensity(proposal.points.rowwise().squaredNorm(), dimension);
   return proposal;
@@ -105,7 +106,7 @@ WeightedDraws WeighProposed(const Cost& cost, const Vector& lower, const Vector&
   draws.etas = etas.topRows(kept);
   draws.costs = costs.head(kept);
   draws.weights = weights.head(kept) / weights.head(kept).sum();
-  draws.effective_size = 1 / draws.weights.squaredNorm();
+  draws.effective_size = EffectiveSizeOfWeights(draws.weights);
   return draws;
 }
 

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/bayes/log_sum_exp.h"
+#include "core/bayes/weighted_samples.h"
 #include "core/chaos/collocation_points.h"
 #include "core/common/check.h"
 #include "core/common/linear_algebra.h"
@@ -66,7 +67,7 @@ void SetMoments(const Vector& mean, const Matrix& covariance, GaussianMode& mode
 
 // Moves the mode to the draws in it, whose weights (Σ = 1) are given.
 void Adapt(const Matrix& etas, const Vector& weights, GaussianMode& mode) {
-  const double draws = 1 / weights.squaredNorm();
+  const double draws = EffectiveSizeOfWeights(weights);
   const double part = draws / (draws + kPresentPerDimension * static_cast<double>(etas.cols()));
   const Vector mean = part * etas.transpose() * weights + (1 - part) * mode.centre;
   const Matrix centred = etas.rowwise() - mean.transpose();
@@ -87,7 +88,7 @@ WeightedDraws ImportanceSample(const Cost& cost, const Vector& lower, const Vect
   const Vector shares = SharesOf(modes);
   const Eigen::VectorXi counts = CountsOf(shares, points);
   const std::vector<Germ> germs(static_cast<size_t>(n), Germ::Normal());
-  Matrix etas = CollocationPoints(PointSet::kHalton, germs, 0, counts.sum()).value();
+  Matrix etas = HaltonDraws(germs, counts.sum());
   Eigen::Index first = 0;
   for (Eigen::Index m = 0; m < counts.size(); ++m) {
     const GaussianMode& mode = modes[static_cast<size_t>(m)];

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/bayes/domain_cover.h"
+#include "core/bayes/weighted_samples.h"
 #include "core/common/infeasible.h"
 #include "core/common/status.h"
 
@@ -84,8 +85,7 @@ class Sampler {
   double TemperingStep(double most) const {
     const auto keeps_enough = [&](double step) {
       const Vector w = Weights(step);
-      return w.sum() * w.sum() / w.squaredNorm() >=
-             kEffectiveFraction * static_cast<double>(w.size());
+      return EffectiveSizeOfWeights(w) >= kEffectiveFraction * static_cast<double>(w.size());
     };
     if (keeps_enough(most)) return most;
     double low = 0;

@@ -37,10 +37,10 @@ Prior::Prior(std::vector<UncertainParameter> parameters, const Matrix& correlati
     const UncertainParameter& parameter = parameters_[static_cast<size_t>(i)];
     POLYEST_CHECK(parameter.scale > 0);
     const bool correlated = (correlation.row(i).array() != 0).count() > 1;
-    in_copula_.push_back(correlated || IsScoredForPopulation(parameter));
+    has_normal_score_.push_back(correlated || IsScoredForPopulation(parameter));
     correlated_ = correlated_ || correlated;
     marginal_germs_.push_back(Germ(parameter.germ));
-    germs_.push_back(in_copula_.back() ? Germ::Normal() : marginal_germs_.back());
+    germs_.push_back(has_normal_score_.back() ? Germ::Normal() : marginal_germs_.back());
     lower_[i] = germs_.back().Lower();
     upper_[i] = germs_.back().Upper();
   }
@@ -120,8 +120,8 @@ Vector Prior::ToGerm(const ConstVectorRef& theta) const {
   return OfScores(z);
 }
 
-// Computes ∂θ/∂ξ = diag(t′) F with t_i′ = dθ_i/dx_i · φ(z_i)/ρ_i(x_i), x_i the marginal germ of a
-// correlated parameter.
+// Returns t_i′ = dθ_i/dz_i = dθ_i/dx_i · φ(z_i)/ρ_i(x_i), x_i the marginal germ of a parameter with
+// a normal score z_i.
 double Prior::SlopeOfScore(int parameter, double z) const {
   const UncertainParameter& marginal = parameters_[static_cast<size_t>(parameter)];
   const double x = MarginalGerm(parameter, z);

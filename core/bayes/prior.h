@@ -81,12 +81,14 @@ class Prior {
   Prior(std::vector<UncertainParameter> parameters, const Matrix& correlation);
 
   // Whether the parameter's germ and score are standard normal for the copula or a population.
-  bool HasNormalScore(int parameter) const { return in_copula_[static_cast<size_t>(parameter)]; }
+  bool HasNormalScore(int parameter) const {
+    return has_normal_score_[static_cast<size_t>(parameter)];
+  }
 
   std::vector<UncertainParameter> parameters_;
   std::vector<Germ> marginal_germs_;  // of the parameters, whether correlated or not
   std::vector<Germ> germs_;
-  std::vector<bool> in_copula_;
+  std::vector<bool> has_normal_score_;
   bool correlated_ = false;
   Matrix factor_;
   Vector lower_, upper_;

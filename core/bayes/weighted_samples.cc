@@ -97,6 +97,10 @@ std::vector<Eigen::Index> RowsAt(const ConstVectorRef& weights, int count, Place
 
 }  // namespace
 
+double EffectiveSizeOfWeights(const ConstVectorRef& weights) {
+  return weights.sum() * weights.sum() / weights.squaredNorm();
+}
+
 double WeightedMean(const ConstVectorRef& draws, const ConstVectorRef& weights) {
   return weights.dot(draws);
 }

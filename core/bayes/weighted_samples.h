@@ -9,6 +9,10 @@
 
 namespace polyest::internal {
 
+// Returns (Σ w)²/Σ w², the number of equally weighted draws that tell as much. The weights need not
+// be normalized.
+double EffectiveSizeOfWeights(const ConstVectorRef& weights);
+
 double WeightedMean(const ConstVectorRef& draws, const ConstVectorRef& weights);
 double WeightedStandardDeviation(const ConstVectorRef& draws, const ConstVectorRef& weights);
 

@@ -25,6 +25,12 @@ struct WindowSpan {
   int first_run = 0, last_run = 0;
   double start_s = 0;  // time of its first row in first_run
   double end_s = 0;    // time of its last row in last_run
+
+  // cereal calls this for writing and for reading.
+  template <class Archive>
+  void serialize(Archive& archive) {
+    archive(rows, first_run, last_run, start_s, end_s);
+  }
 };
 
 class WindowSums {
@@ -76,9 +82,9 @@ class WindowSums {
   template <class Archive>
   void save(Archive& archive) const {
     archive(length_, static_cast<int64_t>(closed_));
-    Write(archive, open_);
+    archive(open_);
     for (size_t i = 0; i < closed_; ++i) {
-      Write(archive, windows_[i].span);
+      archive(windows_[i].span);
       archive(windows_[i].totals);
     }
   }
@@ -86,11 +92,11 @@ class WindowSums {
   void load(Archive& archive) {
     int64_t closed = 0;
     archive(length_, closed);
-    Read(archive, open_);
+    archive(open_);
     windows_.clear();
     for (int64_t i = 0; i < closed; ++i) {
       Window& window = windows_.emplace_back();
-      Read(archive, window.span);
+      archive(window.span);
       archive(window.totals);
     }
     closed_ = windows_.size();
@@ -101,15 +107,6 @@ class WindowSums {
     WindowSpan span;
     std::vector<Totals> totals;
   };
-
-  template <class Archive>
-  static void Write(Archive& archive, const WindowSpan& span) {
-    archive(span.rows, span.first_run, span.last_run, span.start_s, span.end_s);
-  }
-  template <class Archive>
-  static void Read(Archive& archive, WindowSpan& span) {
-    archive(span.rows, span.first_run, span.last_run, span.start_s, span.end_s);
-  }
 
   void MergeNeighbours();
 
