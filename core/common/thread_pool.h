@@ -38,8 +38,10 @@ class ThreadPool {
   // help it, and returns when all are done. At most `threads` take part, the caller included, and
   // fewer while there are not as many cores; but if `threads` is more than the cores, as for models
   // that wait for another machine, all of them may. Loops that run at the same time share the
-  // helpers evenly. The first exception that `work` throws ends the loop early and is rethrown. The
-  // threads are made as they are first wanted, with the priority of the caller.
+  // helpers evenly. Threads come to help when the loop begins and when they have helped another
+  // one, not when a core becomes free otherwise. The first exception that `work` throws ends the
+  // loop early and is rethrown. The threads are made as they are first wanted, with the priority of
+  // the caller.
   void Run(int items, int threads, absl::FunctionRef<void(int)> work);
 
  private:

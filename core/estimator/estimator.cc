@@ -243,10 +243,10 @@ absl::StatusOr<DensityBasis> Estimator::Implementation::MakeDensityBasis(const S
 
 absl::StatusOr<LogDensity> Estimator::Implementation::CurrentLogDensity(
     const LogDensityOptions& options, const Stop& stop) const {
+  POLYEST_RETURN_IF_ERROR(Validate(options, estimated_problem().prior().Names()));
   if (!density_) {
     POLYEST_ASSIGN_OR_RETURN(density_, MakeDensityBasis(stop));
   }
-  POLYEST_RETURN_IF_ERROR(Validate(options, density_->components.front().cost.prior().Names()));
   return EvaluateLogDensity(*density_, options);
 }
 

@@ -150,16 +150,26 @@ void serialize(Archive& archive, ScoreMixture& shape) {
   archive(shape.first, shape.step, shape.log_weights);
 }
 
+// Writes or reads all fields of ended runs; `Ended` is const for writing. The region and the basis
+// are made of the other arguments.
+template <class Archive, class Ended>
+void ArchiveFields(Archive& archive, Ended& ended, Vector& centre, Matrix& axes,
+                   Truncation& truncation, std::vector<double>& spent) {
+  archive(ended.rows, ended.samples, ended.run, ended.first_row, ended.paths, ended.centre,
+          ended.factor, centre, axes, truncation.order, truncation.exponent, ended.sums, spent,
+          ended.discount, ended.own_error, ended.log_noise, ended.log_variance, ended.outliers,
+          ended.largest, ended.remainder, ended.noise_scale, ended.noise_time_constant_s,
+          ended.noise_white_share, ended.shapes, ended.left_out, ended.unresolved, ended.windows);
+}
+
 template <class Archive>
 void save(Archive& archive, const EndedRuns& ended) {
+  Vector centre = ended.region.centre();
+  Matrix axes = ended.region.axes();
+  Truncation truncation = ended.basis->truncation();
   std::vector<double> spent;
   for (const ChannelSums& sums : ended.sums) spent.push_back(sums.spent);
-  archive(ended.rows, ended.samples, ended.run, ended.first_row, ended.paths, ended.centre,
-          ended.factor, ended.region.centre(), ended.region.axes(), ended.basis->truncation().order,
-          ended.basis->truncation().exponent, ended.sums, spent, ended.discount, ended.own_error,
-          ended.log_noise, ended.log_variance, ended.outliers, ended.largest, ended.remainder,
-          ended.noise_scale, ended.noise_time_constant_s, ended.noise_white_share, ended.shapes,
-          ended.left_out, ended.unresolved, ended.windows);
+  ArchiveFields(archive, ended, centre, axes, truncation, spent);
 }
 
 template <class Archive>
@@ -168,11 +178,7 @@ void load(Archive& archive, EndedRuns& ended) {
   Matrix axes;
   Truncation truncation;
   std::vector<double> spent;
-  archive(ended.rows, ended.samples, ended.run, ended.first_row, ended.paths, ended.centre,
-          ended.factor, centre, axes, truncation.order, truncation.exponent, ended.sums, spent,
-          ended.discount, ended.own_error, ended.log_noise, ended.log_variance, ended.outliers,
-          ended.largest, ended.remainder, ended.noise_scale, ended.noise_time_constant_s,
-          ended.noise_white_share, ended.shapes, ended.left_out, ended.unresolved, ended.windows);
+  ArchiveFields(archive, ended, centre, axes, truncation, spent);
   const Eigen::Index n = centre.size();
   if (n < 1 || n > kMaxParametersOfRuns || axes.rows() != n || axes.cols() != n ||
       !centre.allFinite() || !axes.allFinite() || spent.size() != ended.sums.size() ||

@@ -21,8 +21,7 @@ constexpr double kFarTail = 1e-6;             // omitted in each tail of a germ,
 constexpr int kFewForTails = 2;               // parameters
 constexpr double kMargin = 1.35;              // widening of a region beyond its particles
 constexpr double kMinHalfWidth = 1e-10;       // minimum for a region, in germ units
-constexpr double kBeyond = 1.12;  // factor of the half width at which Ω is checked beyond an edge
-constexpr double kGoesOnFraction = 0.2;  // minimum fraction of the particles at an edge
+constexpr double kGoesOnFraction = 0.2;       // minimum fraction of the particles at an edge
 constexpr int kPointsPerDrawnCheck = 6;
 constexpr int kMaxDrawnChecks = 200;
 constexpr int kChecksPastDimension = 3;
@@ -34,18 +33,22 @@ int PointCount(const ResolvedProblem& problem, const Basis& basis) {
 
 // Returns local coordinates in units of the trusted box: e with η = middle + half ∘ e.
 Matrix InBoxUnits(const ExpansionDesign& design, const Matrix& etas) {
-  const Vector middle = 0.5 * (design.lower + design.upper);
-  const Vector half = 0.5 * (design.upper - design.lower);
-  return (etas.rowwise() - middle.transpose()).array().rowwise() / half.transpose().array();
+  return (etas.rowwise() - design.Middle().transpose()).array().rowwise() /
+         design.HalfWidths().transpose().array();
 }
 
 }  // namespace
 
 int CheckCount(int dimension) { return dimension + kChecksPastDimension; }
 
-int DrawnCheckCount(const ExpansionDesign& design) {
+void SetDrawnChecks(const ConstMatrixRef& xis, const ConstVectorRef& costs,
+                    ExpansionDesign& design) {
   const int part = static_cast<int>(design.points.rows()) / kPointsPerDrawnCheck;
-  return std::max(CheckCount(design.basis->dimension()), std::min(part, kMaxDrawnChecks));
+  const int most = std::max(CheckCount(design.basis->dimension()), std::min(part, kMaxDrawnChecks));
+  const auto count = std::min<Eigen::Index>(most, xis.rows());
+  design.check_points = design.region.ManyToLocal(xis.topRows(count));
+  design.check_costs = costs.head(count);
+  design.checks_are_draws = true;
 }
 
 std::pair<double, double> TrustedRange(const Germ& germ) {
@@ -238,16 +241,14 @@ Region RegionOfParticles(const Matrix& xis) {
 }
 
 Region TrustedRegion(const ExpansionDesign& design) {
-  const Vector middle = 0.5 * (design.lower + design.upper);
-  const Vector half = 0.5 * (design.upper - design.lower);
-  return Region(design.region.ToGerm(middle), design.region.axes() * half.asDiagonal());
+  return Region(design.region.ToGerm(design.Middle()),
+                design.region.axes() * design.HalfWidths().asDiagonal());
 }
 
 void SamplingBox(const ExpansionDesign& design, Vector& lower, Vector& upper) {
-  const Vector middle = 0.5 * (design.lower + design.upper);
-  const Vector half = 0.5 * kOvershoot * (design.upper - design.lower);
-  lower = middle - half;
-  upper = middle + half;
+  const Vector half = kOvershoot * design.HalfWidths();
+  lower = design.Middle() - half;
+  upper = design.Middle() + half;
 }
 
 std::vector<int> LeaningAxes(const ExpansionDesign& design, const Prior& prior,
@@ -262,7 +263,7 @@ std::vector<int> LeaningAxes(const ExpansionDesign& design, const Prior& prior,
       if (std::abs(units(i, j)) <= kEdge) continue;
       ++at_edge;
       Vector beyond = units.row(i).transpose();
-      beyond[j] *= kBeyond;
+      beyond[j] *= kBeyondEdge;
       const Vector xi = trusted.ToGerm(beyond);
       if (prior.Contains(xi) && element.Contains(xi)) ++goes_on;
     }

@@ -35,6 +35,10 @@ struct ExpansionDesign {
   bool whole_prior = true;  // whether the basis is orthonormal with the prior as weight
   bool in_tails = false;    // whether it is that of DesignForTails
   Element element;          // the part of Ω whose posterior this expansion represents
+
+  // Of the trusted box (n each).
+  Vector Middle() const { return 0.5 * (lower + upper); }
+  Vector HalfWidths() const { return 0.5 * (upper - lower); }
 };
 
 // Fraction of the trusted box beyond which a particle counts as lying at its edge, and how far
@@ -42,12 +46,17 @@ struct ExpansionDesign {
 // that extends beyond the box visible.
 inline constexpr double kEdge = 0.97;
 inline constexpr double kOvershoot = 1.15;
+// Factor of the half width at which Ω is looked for beyond an edge.
+inline constexpr double kBeyondEdge = 1.12;
 
 // Returns the number of check points that cover the prior or a region: the dimension plus 3.
 int CheckCount(int dimension);
-// Returns the number of check points that are draws of a posterior, which also correct it
-// (posterior/model_correction.h): as many, or a sixth of the collocation points, at most 200.
-int DrawnCheckCount(const ExpansionDesign& design);
+// Makes the first of these draws of a posterior (W × n, germ coordinates) the check points; `costs`
+// are the negative logarithms of their density. Such check points also correct the posterior
+// (posterior/model_correction.h), so that there are up to a sixth as many as collocation points, at
+// most 200, and not fewer than CheckCount if there are as many draws.
+void SetDrawnChecks(const ConstMatrixRef& xis, const ConstVectorRef& costs,
+                    ExpansionDesign& design);
 // Returns the range in which an expansion in this germ is trusted: between its bounds, or its 0.1 %
 // and 99.9 % quantiles where it has none.
 std::pair<double, double> TrustedRange(const Germ& germ);

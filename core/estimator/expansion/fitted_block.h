@@ -30,7 +30,7 @@ struct FittedBlock {
   const SampleRow& Row(int row) const { return rows.rows[static_cast<size_t>(row)]; }
   // The sample of a channel; NaN where it is missing.
   double Value(int row, int channel) const {
-    const size_t width = rows.values.size() / rows.rows.size();
+    const size_t width = rows.width();
     return rows.values[static_cast<size_t>(row) * width + static_cast<size_t>(channel)];
   }
   // The standard deviation of its noise; 0 where it is missing.

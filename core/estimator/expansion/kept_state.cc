@@ -11,8 +11,13 @@
 namespace polyest::internal {
 namespace {
 
-int64_t Interval(const ResolvedProblem& problem) {
-  return problem.problem().integration.samples_between_checkpoints;
+// Returns whether a state is kept before `row`, which begins a run or is one of the run that began
+// with the row `run_begin`. The last state was kept before the row `kept`.
+bool IsDue(const ResolvedProblem& problem, int64_t row, bool begins_run, int64_t run_begin,
+           int64_t kept) {
+  const int64_t interval = problem.problem().integration.samples_between_checkpoints;
+  if (begins_run) return row - kept >= interval;
+  return problem.has_checkpoints_in_runs() && (row - run_begin) % interval == 0;
 }
 
 // Returns the number of rows after which a state was kept.
@@ -23,14 +28,12 @@ int64_t KeptRows(const std::shared_ptr<const ExpansionState>& state) {
 }  // namespace
 
 int RegionalExpansion::RowsToKeptState(const RowBlock& block) const {
-  const int64_t interval = Interval(problem_);
-  const bool inside = problem_.has_checkpoints_in_runs();
   int64_t kept = KeptRows(kept_state_), begin = trajectories_.run_begin();
   int run = trajectories_.run();
   for (int k = 0; k < block.count(); ++k) {
     const int64_t row = trajectories_.next_row() + k;
     const bool begins = block.rows[static_cast<size_t>(k)].run != run;
-    const bool due = begins ? row - kept >= interval : inside && (row - begin) % interval == 0;
+    const bool due = IsDue(problem_, row, begins, begin, kept);
     if (due && k > 0) return k;
     if (due) kept = row;
     if (!begins) continue;
@@ -46,11 +49,8 @@ void RegionalExpansion::KeepState(int next_run) {
   const int64_t rows = trajectories_.next_row();
   if (absorbed_.rows != rows || rows == problem_.first_row()) return;
   const bool begins = next_run != trajectories_.run();
-  const int64_t interval = Interval(problem_);
-  const bool due = begins ? rows - KeptRows(kept_state_) >= interval
-                          : problem_.has_checkpoints_in_runs() &&
-                                (rows - trajectories_.run_begin()) % interval == 0;
-  if (!due || KeptRows(kept_state_) == rows) return;
+  const int64_t kept = KeptRows(kept_state_);
+  if (!IsDue(problem_, rows, begins, trajectories_.run_begin(), kept) || kept == rows) return;
   ExpansionState state = State();
   if (begins) {
     state.trajectories.ensemble.reset();

@@ -9,8 +9,7 @@
 namespace polyest::internal {
 namespace {
 
-constexpr double kTail = 2.2;       // 1.4 % lie beyond so many standard deviations
-constexpr double kPastEdge = 1.12;  // factor of the half width at which Ω is looked for
+constexpr double kTail = 2.2;  // 1.4 % lie beyond so many standard deviations
 
 }  // namespace
 
@@ -18,8 +17,7 @@ bool MayLean(const Cost& cost, const ExpansionDesign& design, const Vector& star
   const Minimum minimum =
       FindMinimaOf(cost, SearchOf(cost, design), start.transpose(), Stop()).front();
   const CholeskyFactor cholesky(cost.Hessian(minimum.point));
-  const Vector middle = 0.5 * (design.lower + design.upper);
-  const Vector half = 0.5 * (design.upper - design.lower);
+  const Vector middle = design.Middle(), half = design.HalfWidths();
   const Vector place = (minimum.point - middle).cwiseQuotient(half);
   const auto n = static_cast<Eigen::Index>(cost.dimension());
   for (Eigen::Index j = 0; j < n; ++j) {
@@ -32,7 +30,7 @@ bool MayLean(const Cost& cost, const ExpansionDesign& design, const Vector& star
     for (const double side : {-1.0, 1.0}) {
       if (side * place[j] + kTail * deviation < kEdge) continue;
       Vector beyond = minimum.point;
-      beyond[j] = middle[j] + side * kPastEdge * half[j];
+      beyond[j] = middle[j] + side * kBeyondEdge * half[j];
       const Vector xi = design.region.ToGerm(beyond);
       if (cost.prior().Contains(xi) && cost.element().Contains(xi)) return true;
     }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include "core/bayes/weighted_samples.h"
 #include "core/estimator/expansion/model_agreement.h"
 
 namespace polyest::internal {
@@ -50,7 +51,7 @@ bool Confirmed(const Points& points, double beta, double inflation, double effec
   const Eigen::ArrayXd costs = beta * points.least + points.prior;
   const Eigen::ArrayXd weights = (costs.minCoeff() - costs).exp();
   const double sum = weights.sum();
-  if (sum * sum < effective * weights.square().sum()) return false;
+  if (EffectiveSizeOfWeights(weights.matrix()) < effective) return false;
   const double mean = (weights * points.difference).sum() / sum;
   const double variance = (weights * (points.difference - mean).square()).sum() / sum;
   return beta * inflation * std::sqrt(variance) <= kMaxSpread;

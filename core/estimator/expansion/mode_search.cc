@@ -147,8 +147,11 @@ void ModeSearch::FindMore() {
   for (int search = 1; search <= kMaxSearches && in_vain < 2 && stop_.Check().ok(); ++search) {
     const Matrix covering = BestOf(0, cover_, search * kStartsOfSearch, search * kBestOfSearch);
     const Matrix corners = Corners();
-    Matrix starts(kStartsOfSearch + corners.rows(), cost_.dimension());
-    starts << covering.bottomRows(kStartsOfSearch), corners;
+    // There are fewer where the cost is finite at hardly any point of the cover.
+    const Eigen::Index fresh = std::min<Eigen::Index>(kStartsOfSearch, covering.rows());
+    Matrix starts(fresh + corners.rows(), cost_.dimension());
+    if (starts.rows() == 0) return;
+    starts << covering.bottomRows(fresh), corners;
     in_vain = FindsOthers(starts) ? 0 : in_vain + 1;
   }
 }

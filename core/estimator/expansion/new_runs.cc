@@ -78,10 +78,8 @@ Matrix ParticlesForNewRuns(const ResolvedProblem& grown, const Matrix& present) 
   Matrix particles(present.rows(), grown.dimension());
   particles.leftCols(known) = present;
   if (known == grown.dimension() || present.rows() == 0) return particles;
-  const absl::StatusOr<Matrix> draws = CollocationPoints(PointSet::kHalton, NewGerms(grown, known),
-                                                         1, static_cast<int>(present.rows()));
-  POLYEST_CHECK(draws.ok());
-  particles.rightCols(grown.dimension() - known) = *draws;
+  particles.rightCols(grown.dimension() - known) =
+      HaltonDraws(NewGerms(grown, known), static_cast<int>(present.rows()));
   return particles;
 }
 
@@ -140,10 +138,8 @@ ExpansionDesign DesignAfterEndedRuns(const ResolvedProblem& problem, const Vecto
   const Region region(middle, axes);
   ExpansionDesign design = DesignForRegion(problem, FirstTruncation(problem.problem().expansion, n),
                                            region, MiddleInside(problem.prior(), region));
-  Particles checks = DrawsForNewRun(problem, centre, factor, CheckCount(n));
-  design.check_points = design.region.ManyToLocal(checks.etas);
-  design.check_costs = std::move(checks.costs);
-  design.checks_are_draws = true;
+  const Particles checks = DrawsForNewRun(problem, centre, factor, CheckCount(n));
+  SetDrawnChecks(checks.etas, checks.costs, design);
   // Bounds along the own germs of earlier runs say nothing of this one's.
   std::vector<Element::Bound> bounds;
   for (const Element::Bound& bound : present.bounds()) {

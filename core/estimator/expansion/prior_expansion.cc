@@ -30,7 +30,7 @@ constexpr int64_t kMaxCounted = int64_t{1} << 50;
 // none of them is one.
 Matrix DrawPrior(const std::vector<Germ>& germs, Eigen::Index points, int draws) {
   const int count = static_cast<int>(points) + draws;
-  return CollocationPoints(PointSet::kHalton, germs, 1, count).value().bottomRows(draws);
+  return HaltonDraws(germs, count).bottomRows(draws);
 }
 
 absl::Status CheckNoStreamedInput(const ResolvedProblem& problem) {

@@ -283,12 +283,8 @@ class Settler {
     const Vector inside = result_.particles.colwise().mean().transpose();
     ExpansionDesign design =
         DesignForRegion(*request_.problem, truncation, std::move(region), inside);
-    const Eigen::Index checks =
-        std::min<Eigen::Index>(DrawnCheckCount(design), result_.particles.rows());
     design.element = present_.design().element;
-    design.check_points = design.region.ManyToLocal(result_.particles.topRows(checks));
-    design.check_costs = particles_.costs.head(checks);
-    design.checks_are_draws = true;
+    SetDrawnChecks(result_.particles, particles_.costs, design);
     return design;
   }
 

@@ -31,10 +31,7 @@ absl::StatusOr<ExpansionDesign> DesignWithDraws(const ResolvedProblem& problem,
                                                 const Truncation& truncation,
                                                 const Matrix& particles, const Vector& costs) {
   POLYEST_ASSIGN_OR_RETURN(ExpansionDesign design, DesignForPrior(problem, truncation));
-  const auto checks = std::min<Eigen::Index>(DrawnCheckCount(design), particles.rows());
-  design.check_points = design.region.ManyToLocal(particles.topRows(checks));
-  design.check_costs = costs.head(checks);
-  design.checks_are_draws = true;
+  SetDrawnChecks(particles, costs, design);
   return design;
 }
 

@@ -20,7 +20,7 @@ constexpr int kLineNodes = 48;
 constexpr int kBoxNodes = 7;  // for each of two or three parameters
 constexpr Eigen::Index kMaxInBox = 3;
 
-// Returns the Hessian, raised until it is positive definite.
+// Returns the Hessian, which must be finite, raised until it is positive definite.
 Matrix PositiveDefinite(const Matrix& hessian) {
   const Eigen::Index n = hessian.rows();
   const double size = std::max(hessian.cwiseAbs().maxCoeff(), 1e-12);
@@ -29,6 +29,15 @@ Matrix PositiveDefinite(const Matrix& hessian) {
     raised = hessian + shift * Matrix::Identity(n, n);
   }
   return raised;
+}
+
+// Returns what stands for a minimum where the cost has no Hessian.
+ConditionalMinimum NoMinimum(const Vector& start) {
+  ConditionalMinimum none;
+  none.own = start;
+  none.hessian.setIdentity(start.size(), start.size());
+  none.value = kInfinity;
+  return none;
 }
 
 // Returns −log ∫ of values with weights.
@@ -47,12 +56,14 @@ ConditionalMinimum RunMarginal::Minimize(const Vector& origin, const Vector& sta
   Vector gradient(origin.size());
   ConditionalMinimum minimum;
   minimum.own = start;
-  for (int i = 0; i < kMaxSteps; ++i) {
+  for (int steps = 0;; ++steps) {
     const Vector eta = origin + directions_ * minimum.own;
     minimum.value = cost_.EvaluateWithGradient(eta, gradient).total;
-    minimum.hessian = PositiveDefinite(directions_.transpose() * cost_.Hessian(eta) * directions_);
+    const Matrix hessian = directions_.transpose() * cost_.Hessian(eta) * directions_;
+    if (!hessian.allFinite()) return NoMinimum(start);
+    minimum.hessian = PositiveDefinite(hessian);
     Vector step = -CholeskyFactor(minimum.hessian).Solve(directions_.transpose() * gradient);
-    if (!step.allFinite() || !(step.norm() > kShortestStep)) break;
+    if (steps == kMaxSteps || !step.allFinite() || !(step.norm() > kShortestStep)) break;
     if (step.norm() > kLongestStep) step *= kLongestStep / step.norm();
     int halvings = 0;
     for (; halvings < kMaxHalvings; ++halvings, step /= 2) {

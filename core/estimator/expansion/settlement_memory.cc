@@ -59,10 +59,9 @@ Matrix Reweighted(const Matrix& particles, const Vector& costs, const Cost& pres
   const double most = weights.maxCoeff();
   if (!std::isfinite(most)) return none;
   weights = (weights.array() - most).exp();
-  const double sum = weights.sum();
   const auto count = static_cast<double>(weights.size());
-  if (!(sum * sum >= kLeastEffective * count * weights.squaredNorm())) return none;
-  weights /= sum;
+  if (!(EffectiveSizeOfWeights(weights) >= kLeastEffective * count)) return none;
+  weights /= weights.sum();
   return etas(EquallyWeighted(weights, static_cast<int>(weights.size())), Eigen::all);
 }
 

@@ -81,7 +81,7 @@ class Assessment {
     DescribeBias(cost, eta, stop);
     POLYEST_RETURN_IF_ERROR(stop.Check());
     DescribeFilters();
-    estimate_.diagnostics = Diagnose(findings_, estimate_);
+    POLYEST_ASSIGN_OR_RETURN(estimate_.diagnostics, Diagnose(findings_, estimate_, stop));
     return Assessed{std::move(estimate_), std::move(posterior_), std::move(findings_), share,
                     std::move(filtered_), log_evidence};
   }

@@ -38,7 +38,7 @@ Eigen::Index AxisOfFailures(const RegionalExpansion& expansion) {
   Eigen::Index axis = 0;
   if (kept.empty()) return axis;
   const Vector mean = points(kept, Eigen::all).colwise().mean().transpose();
-  const Vector half = 0.5 * (expansion.design().upper - expansion.design().lower);
+  const Vector half = expansion.design().HalfWidths();
   (mean - points.colwise().mean().transpose()).cwiseQuotient(half).cwiseAbs().maxCoeff(&axis);
   return axis;
 }

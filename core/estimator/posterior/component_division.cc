@@ -164,11 +164,7 @@ ExpansionDesign MixtureComponent::DesignOn(const MixtureComponent& parent,
     SpreadCheckPoints(problem_, middle, design);
     return design;
   }
-  const Eigen::Index count =
-      std::min<Eigen::Index>(DrawnCheckCount(design), piece.particles.rows());
-  design.check_points = design.region.ManyToLocal(piece.particles.topRows(count));
-  design.check_costs = piece.costs.head(count);
-  design.checks_are_draws = true;
+  SetDrawnChecks(piece.particles, piece.costs, design);
   return design;
 }
 

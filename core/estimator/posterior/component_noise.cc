@@ -106,7 +106,7 @@ absl::StatusOr<bool> MixtureComponent::RaiseUnlearnedScales(const RowBlock& bloc
   if (!learns_noise_) return false;
   std::optional<LearnedNoise> raised;  // set only when needed: this runs for every sample
   const std::vector<ChannelNoise>& present = expansion_->noise().channels;
-  const size_t width = block.values.size() / block.rows.size();
+  const size_t width = block.width();
   for (size_t c = 0; c < present.size(); ++c) {
     const double shape = block.noise[static_cast<size_t>(row) * present.size() + c];
     if (!problem_.problem().measured[c].noise.unknown || present[c].learned || shape <= 0) continue;

@@ -6,11 +6,11 @@
 
 #include "core/estimator/expansion/search_domain.h"
 #include "core/estimator/posterior/cost_slice.h"
+#include "core/estimator/posterior/posterior_pieces.h"
 
 namespace polyest::internal {
 namespace {
 
-constexpr double kWallOfPiece = 8;  // difference in cost: e^−8 ≈ 3·10⁻⁴
 // Distance from the bound at which the cost is taken, as a fraction of the element's extent: on the
 // bound itself rounding decides whether a point belongs to the element.
 constexpr double kOffWall = 1e-9;
@@ -41,12 +41,12 @@ double CostWhereLeast(const ElementCost& other, const ElementCost& element) {
 
 bool AreConnected(const ElementCost& a, const ElementCost& b) {
   const double peak = std::max(a.minimum.value + a.height, b.minimum.value + b.height);
-  if (std::min(CostWhereLeast(a, b), CostWhereLeast(b, a)) < peak + kWallOfPiece) return true;
+  if (std::min(CostWhereLeast(a, b), CostWhereLeast(b, a)) < peak + kMinWall) return true;
   for (const Element::Bound& bound : a.design->element.bounds()) {
     for (const Element::Bound& other : b.design->element.bounds()) {
       if (!bound.IsOpposite(other)) continue;
       // Both sides must reach the bound, each at its own place if the expansions differ a little.
-      return LeastAt(bound, a) < peak + kWallOfPiece && LeastAt(other, b) < peak + kWallOfPiece;
+      return LeastAt(bound, a) < peak + kMinWall && LeastAt(other, b) < peak + kMinWall;
     }
   }
   return false;
@@ -60,8 +60,9 @@ std::vector<size_t> ConnectedPieces(const std::vector<ElementCost>& elements) {
     pieces[i] = i;
     for (size_t k = 0; k < i; ++k) {
       if (pieces[k] == pieces[i] || !AreConnected(elements[k], elements[i])) continue;
-      const auto [kept, joined] = std::minmax(pieces[k], pieces[i]);
-      std::ranges::replace(pieces, joined, size_t{kept});
+      // Copies, because `replace` reads what it compares with after it has overwritten elements.
+      const size_t kept = std::min(pieces[k], pieces[i]), joined = std::max(pieces[k], pieces[i]);
+      std::ranges::replace(pieces, joined, kept);
     }
   }
   std::vector<size_t> numbers = pieces;

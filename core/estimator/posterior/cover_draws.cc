@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "core/bayes/differential_evolution.h"
+#include "core/bayes/weighted_samples.h"
 #include "core/chaos/collocation_points.h"
 
 namespace polyest::internal {
@@ -39,7 +40,7 @@ double ResolvedPower(const Vector& costs) {
   double power = 1;
   for (; power > 1e-12; power *= kTemper) {
     const Vector weights = (power * (costs.minCoeff() - costs.array())).exp();
-    if (weights.sum() * weights.sum() >= kResolved * weights.squaredNorm()) break;
+    if (EffectiveSizeOfWeights(weights) >= kResolved) break;
   }
   return power;
 }
@@ -71,7 +72,7 @@ WeightedDraws WeightedBy(const Vector& costs, const Matrix& cover) {
   draws.etas = cover(kept, Eigen::all);
   draws.costs = costs(kept);
   draws.weights = weights(kept) / weights(kept).sum();
-  draws.effective_size = 1 / draws.weights.squaredNorm();
+  draws.effective_size = EffectiveSizeOfWeights(draws.weights);
   return draws;
 }
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/common/status.h"
 #include "core/estimator/expansion/carry_over.h"
 #include "core/estimator/posterior/residual_diagnosis.h"
 #include "core/estimator/posterior/undersampling.h"
@@ -360,10 +361,12 @@ const std::string& Findings::NameOf(int parameter) const {
   return problem->prior().parameters()[static_cast<size_t>(parameter)].name;
 }
 
-std::vector<Diagnostic> Diagnose(const Findings& findings, const Estimate& estimate) {
+absl::StatusOr<std::vector<Diagnostic>> Diagnose(const Findings& findings, const Estimate& estimate,
+                                                 const Stop& stop) {
   std::vector<Diagnostic> diagnostics;
   AddIdentifiability(findings, estimate, diagnostics);
-  AddUndersampling(findings, estimate, diagnostics);
+  AddUndersampling(findings, estimate, stop, diagnostics);
+  POLYEST_RETURN_IF_ERROR(stop.Check());
   AddInaccuracy(findings, estimate, diagnostics);
   AddIntegrationError(findings, diagnostics);
   AddPopulation(findings, diagnostics);

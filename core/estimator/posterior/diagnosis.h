@@ -2,6 +2,8 @@
 
 // Warnings to the user about an estimate, each in one sentence.
 
+#include <absl/status/statusor.h>
+
 #include <string>
 #include <vector>
 
@@ -12,6 +14,7 @@
 #include "core/estimator/posterior/window_assessment.h"
 #include "core/estimator/record/record_summary.h"
 #include "polyest/estimate.h"
+#include "polyest/stop.h"
 
 namespace polyest::internal {
 
@@ -81,7 +84,8 @@ struct Findings {
 };
 
 // Returns the diagnostics. Reads the parts of `estimate` that are filled in already; the caller
-// stores the result in its diagnostics.
-std::vector<Diagnostic> Diagnose(const Findings& findings, const Estimate& estimate);
+// stores the result in its diagnostics. Some need runs of the model: fails on a stop request.
+absl::StatusOr<std::vector<Diagnostic>> Diagnose(const Findings& findings, const Estimate& estimate,
+                                                 const Stop& stop);
 
 }  // namespace polyest::internal

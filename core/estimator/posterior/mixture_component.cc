@@ -12,15 +12,13 @@
 #include "core/estimator/expansion/new_runs.h"
 #include "core/estimator/expansion/prior_prediction.h"
 #include "core/estimator/expansion/reexpansion.h"
+#include "core/estimator/expansion/return_to_prior.h"
 #include "core/estimator/posterior/noise_learning.h"
 
 namespace polyest::internal {
 namespace {
 
 constexpr int64_t kBlockRows = 64;
-// At the end of a window the expansion is compared with the model. It is settled again when the
-// posterior's means may be wrong by this many standard deviations.
-constexpr double kMaxShift = 0.08;
 // The fraction of the error that sums may have to be carried over from which on the expansion moves
 // ahead of need. An error of order p + 1 in a phase grows as N^(p + 1.5), at order 3 twentyfold
 // while the record doubles, and most of it is in the last states.
@@ -280,7 +278,7 @@ absl::StatusOr<bool> MixtureComponent::MoveWhileInaccurate(const Stop& stop) {
     const Cost cost = expansion_->MakeCost(problem_.problem().regularization);
     return BelievedShift(*expansion_, cost, bisected_);
   };
-  const auto accurate = [&] { return shift() <= kMaxShift; };
+  const auto accurate = [&] { return shift() <= kAccurateShift; };
   // Each settlement may raise the order, so several may be needed.
   for (; row_end_.settlements < (automatic_order() ? SettlementSchedule::kMaxSettlementsAtRow : 1);
        ++row_end_.settlements) {

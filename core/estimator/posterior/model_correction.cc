@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "core/bayes/pareto_tail.h"
+#include "core/bayes/weighted_samples.h"
 #include "core/common/linear_algebra.h"
 
 namespace polyest::internal {
@@ -78,8 +79,7 @@ Fit FitPolynomial(const Matrix& terms, const Vector& differences, const Vector& 
 }
 
 double EffectiveNumber(const ConstVectorRef& log_weights) {
-  const Vector weights = (log_weights.array() - log_weights.maxCoeff()).exp();
-  return weights.sum() * weights.sum() / weights.squaredNorm();
+  return EffectiveSizeOfWeights((log_weights.array() - log_weights.maxCoeff()).exp().matrix());
 }
 
 }  // namespace

@@ -154,8 +154,8 @@ class Revision {
     return noise.white_share == 0 && noise.time_constant_s == ended->noise_time_constant_s[c];
   }
 
-  // What outliers add to χ² beyond what they count is on either side of Σ w u² = Degrees(), and
-  // would only hide how far the scale is from right.
+  // Solves Σ w u² = Degrees(). What outliers add to χ² beyond what they count is part of both
+  // sides, so it is subtracted from both: it would hide how far the scale is from right.
   void ReviseScale(int c, const ChannelSums& sums, double share, ChannelNoise& noise) {
     const double discount = expansion_.Discount(c);
     if (discount > kMaxDiscount * sums.Degrees()) return;

@@ -38,9 +38,9 @@ inline int64_t MinSamplesForNoise(int64_t n) { return n + 6; }
 int64_t MinSamplesForNoise(const ResolvedProblem& problem);
 
 // Returns the scale of a channel whose scale is not learned yet that its next sample asks for, or
-// nullopt if the present one stays. `value` is |z| of that sample, in units of the noise that the
-// problem gives; it is twice the largest one's. Samples of 0 have no size: before there is another,
-// `predicted`, the size of the predictions in the same units, stands for it.
+// nullopt if the present one stays. The scale is twice the largest |z| so far; `value` is |z| of
+// the next sample. Samples of 0 have no size: before there is another, `predicted`, the size of the
+// predictions, takes its place. Both are in units of the noise that the problem gives.
 std::optional<double> UnlearnedScale(const RecordSummary& record, size_t channel, double value,
                                      double predicted, double present);
 

@@ -122,10 +122,6 @@ Vector OfMonomials(const Matrix& gram) {
   return coefficients;
 }
 
-double CountIndependent(const Vector& weights) {
-  return weights.sum() * weights.sum() / weights.squaredNorm();
-}
-
 // Returns the width of the central 95 %. Unlike the standard deviation it does not depend on long
 // time constants that are hardly probable.
 double IntervalWidth(const ConstVectorRef& draws, const Vector& weights) {
@@ -276,11 +272,11 @@ absl::StatusOr<Vector> MarginalizeNoise(const ResolvedProblem& problem,
     Vector present, tempered;
     cost.EvaluateMany(etas, present);
     wider.EvaluateMany(etas, tempered);
-    const double before = CountIndependent(drawn.weights);
+    const double before = EffectiveSizeOfWeights(drawn.weights);
     Reweigh(tempered - present, drawn);
     const Vector plain = drawn.weights;
     Reweigh(cost.power() * marginal.LogFactors(etas), drawn);
-    const double count = CountIndependent(drawn.weights);
+    const double count = EffectiveSizeOfWeights(drawn.weights);
     const double shape =
         std::max(kMaxShape, TailShape(drawn.weights.array().log()).value_or(kMaxShape));
     if (best && (shape > least_shape || (shape == least_shape && count <= most))) continue;

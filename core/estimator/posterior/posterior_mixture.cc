@@ -354,7 +354,8 @@ absl::StatusOr<AssessedMixture> AssessMixture(std::vector<AssessmentRequest> req
   mixture.whole.estimate.expansion.reexpansions = reexpansions;
   mixture.whole.estimate.expansion.trajectories = trajectories;
   mixture.whole.findings.left_out = left_out;
-  mixture.whole.estimate.diagnostics = Diagnose(mixture.whole.findings, mixture.whole.estimate);
+  POLYEST_ASSIGN_OR_RETURN(mixture.whole.estimate.diagnostics,
+                           Diagnose(mixture.whole.findings, mixture.whole.estimate, stop));
   return mixture;
 }
 

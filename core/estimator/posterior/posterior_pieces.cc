@@ -20,7 +20,6 @@ using Rows = std::vector<Eigen::Index>;
 constexpr int kStartsOfPieces = 12;
 constexpr double kMinShare = 0.02;  // fraction of the particles
 constexpr double kMinGap = 1;       // in standard deviations within the sets
-constexpr double kMinWall = 8;      // difference in cost: e^−8 ≈ 3·10⁻⁴
 constexpr int kRefinements = 4;     // number of refinements of a hyperplane
 constexpr double kMaxGrowth = 2;    // of the volume when pieces are united
 
@@ -178,6 +177,10 @@ class PieceFinder {
 
 std::optional<Piece> UnitePieces(const std::vector<Matrix>& particles,
                                  const std::vector<double>& weights) {
+  // Components of which none has evidence have no particles.
+  if (std::ranges::any_of(particles, [](const Matrix& own) { return own.rows() == 0; })) {
+    return std::nullopt;
+  }
   Vector log_volumes(std::ssize(particles));
   std::vector<Matrix> shares;
   Eigen::Index count = 0;

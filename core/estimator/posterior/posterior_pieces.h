@@ -24,6 +24,9 @@
 
 namespace polyest::internal {
 
+// Least difference in cost between pieces and the wall that parts them: e^−8 ≈ 3·10⁻⁴.
+inline constexpr double kMinWall = 8;
+
 // Minimum number of particles for a division into pieces.
 inline constexpr Eigen::Index kMinParticlesForPieces = 200;
 

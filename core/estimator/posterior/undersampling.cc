@@ -55,13 +55,13 @@ struct SamplingInformation {
 };
 
 // Returns the outputs at the times (channels by turns) of the model at parameters, one row each;
-// nothing if it cannot be run there.
+// nothing if it cannot be run there or is stopped.
 std::optional<Matrix> RunAt(const ResolvedProblem& problem, const Matrix& thetas,
-                            const std::vector<double>& times_s) {
+                            const std::vector<double>& times_s, const Stop& stop) {
   const InputSignals inputs = problem.MakeInputs();
   EnsemblePropagator propagator(problem.MakeEnsemble(thetas, problem.outputs(), 1), &inputs);
   Matrix outputs(thetas.rows(), problem.channels() * std::ssize(times_s));
-  if (!propagator.Advance(times_s, outputs, Stop()).ok() || !outputs.allFinite()) {
+  if (!propagator.Advance(times_s, outputs, stop).ok() || !outputs.allFinite()) {
     return std::nullopt;
   }
   return outputs;
@@ -92,7 +92,8 @@ double Deviation(const Findings& findings, int channel, double output, double la
 
 // Returns the information about a parameter, from runs of the model with it moved by half a prior
 // standard deviation to each side; zeros if the model cannot be run.
-SamplingInformation InformationBetweenSamples(const Findings& findings, int parameter) {
+SamplingInformation InformationBetweenSamples(const Findings& findings, int parameter,
+                                              const Stop& stop) {
   SamplingInformation information;
   const RowBlock& beginning = findings.record->beginning();
   const Prior& prior = findings.problem->prior();
@@ -105,7 +106,7 @@ SamplingInformation InformationBetweenSamples(const Findings& findings, int para
       Moved(prior, findings.map_xi, parameter, 0.5).transpose();
   const Times times = FineTimes(beginning);
   const int m = findings.problem->channels();
-  const std::optional<Matrix> outputs = RunAt(*findings.problem, thetas, times.time_s);
+  const std::optional<Matrix> outputs = RunAt(*findings.problem, thetas, times.time_s, stop);
   if (!outputs) return information;
   Vector by_phase = Vector::Zero(kPhases);
   Vector largest = Vector::Zero(m);
@@ -130,7 +131,7 @@ SamplingInformation InformationBetweenSamples(const Findings& findings, int para
 }
 
 // Returns the numbers of the rows in which a channel has a sample.
-std::vector<int> RowsOf(const RowBlock& beginning, int channels, int channel) {
+std::vector<int> RowsWithSamples(const RowBlock& beginning, int channels, int channel) {
   std::vector<int> rows;
   for (int k = 0; k < beginning.count(); ++k) {
     if (beginning.noise[static_cast<size_t>(k * channels + channel)] > 0) rows.push_back(k);
@@ -198,7 +199,7 @@ std::optional<Aliased> AliasedChannel(const Findings& findings, const Times& tim
   const double rare = findings.problem->dimension() > kMaxSearched ? kRare : kRareIfSearched;
   std::optional<Aliased> least;
   for (int c = 0; c < m; ++c) {
-    const std::vector<int> rows = RowsOf(beginning, m, c);
+    const std::vector<int> rows = RowsWithSamples(beginning, m, c);
     if (std::ssize(rows) < kFewestRows) continue;
     const Vector channel = OutputOf(outputs, 0, c, m);
     const double largest = channel.cwiseAbs().maxCoeff();
@@ -227,7 +228,8 @@ bool PassesAnImage(double turns, double others) {
 
 // Whether a channel's response passes one of its images where the parameters are moved within the
 // prior.
-bool PriorAllowsAnImage(const Findings& findings, const Times& times, const Aliased& aliased) {
+bool PriorAllowsAnImage(const Findings& findings, const Times& times, const Aliased& aliased,
+                        const Stop& stop) {
   const Prior& prior = findings.problem->prior();
   const int n = prior.dimension(), m = findings.problem->channels();
   Matrix thetas(2 * n, n);
@@ -235,9 +237,9 @@ bool PriorAllowsAnImage(const Findings& findings, const Times& times, const Alia
     thetas.row(2 * i) = Moved(prior, findings.map_xi, i, -kMoved).transpose();
     thetas.row(2 * i + 1) = Moved(prior, findings.map_xi, i, kMoved).transpose();
   }
-  const std::optional<Matrix> outputs = RunAt(*findings.problem, thetas, times.time_s);
+  const std::optional<Matrix> outputs = RunAt(*findings.problem, thetas, times.time_s, stop);
   if (!outputs) return false;
-  const std::vector<int> rows = RowsOf(findings.record->beginning(), m, aliased.channel);
+  const std::vector<int> rows = RowsWithSamples(findings.record->beginning(), m, aliased.channel);
   for (Eigen::Index run = 0; run < outputs->rows(); ++run) {
     const Vector channel = OutputOf(*outputs, run, aliased.channel, m);
     const double largest = channel.cwiseAbs().maxCoeff();
@@ -248,7 +250,7 @@ bool PriorAllowsAnImage(const Findings& findings, const Times& times, const Alia
   return false;
 }
 
-void AddAliasing(const Findings& findings, const Estimate& estimate,
+void AddAliasing(const Findings& findings, const Estimate& estimate, const Stop& stop,
                  std::vector<Diagnostic>& diagnostics) {
   const bool tells = std::ranges::any_of(estimate.parameters, [](const ParameterEstimate& p) {
     return p.verdict != Verdict::kNotIdentified;
@@ -258,10 +260,11 @@ void AddAliasing(const Findings& findings, const Estimate& estimate,
   }
   const Times times = FineTimes(findings.record->beginning());
   const Vector theta = findings.problem->prior().ToParameters(findings.map_xi);
-  const std::optional<Matrix> outputs = RunAt(*findings.problem, theta.transpose(), times.time_s);
+  const std::optional<Matrix> outputs =
+      RunAt(*findings.problem, theta.transpose(), times.time_s, stop);
   if (!outputs) return;
   const auto aliased = AliasedChannel(findings, times, *outputs);
-  if (!aliased || !PriorAllowsAnImage(findings, times, *aliased)) return;
+  if (!aliased || !PriorAllowsAnImage(findings, times, *aliased, stop)) return;
   const auto channel = static_cast<size_t>(aliased->channel);
   diagnostics.push_back(
       {DiagnosticCode::kUndersampled,
@@ -273,7 +276,7 @@ void AddAliasing(const Findings& findings, const Estimate& estimate,
 
 }  // namespace
 
-void AddUndersampling(const Findings& findings, const Estimate& estimate,
+void AddUndersampling(const Findings& findings, const Estimate& estimate, const Stop& stop,
                       std::vector<Diagnostic>& diagnostics) {
   if (findings.record->beginning().count() == 0 || !findings.problem->streamed_inputs().empty()) {
     return;
@@ -281,7 +284,7 @@ void AddUndersampling(const Findings& findings, const Estimate& estimate,
   for (int i = 0; i < findings.problem->dimension(); ++i) {
     const ParameterEstimate& parameter = estimate.parameters[static_cast<size_t>(i)];
     if (parameter.verdict != Verdict::kNotIdentified) continue;
-    const SamplingInformation information = InformationBetweenSamples(findings, i);
+    const SamplingInformation information = InformationBetweenSamples(findings, i, stop);
     if (!information.undersampled) continue;
     diagnostics.push_back(
         {DiagnosticCode::kUndersampled,
@@ -290,7 +293,7 @@ void AddUndersampling(const Findings& findings, const Estimate& estimate,
                          "times, or more often",
                          parameter.name, information.between)});
   }
-  AddAliasing(findings, estimate, diagnostics);
+  AddAliasing(findings, estimate, stop, diagnostics);
 }
 
 }  // namespace polyest::internal

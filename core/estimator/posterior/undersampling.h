@@ -22,9 +22,9 @@ namespace polyest::internal {
 // evenly spaced samples are rare (half a turning point or more between two of them; one or more
 // with up to three parameters), and the prior allows values with which a vibration of another
 // frequency has the same samples; this is not examined for models that simulate themselves. The
-// model runs over the beginning of the record. Appends nothing if it cannot be run there, or for a
-// problem with streamed inputs, which are not known between rows.
-void AddUndersampling(const Findings& findings, const Estimate& estimate,
+// model runs over the beginning of the record. Appends nothing if it cannot be run there or is
+// stopped, or for a problem with streamed inputs, which are not known between rows.
+void AddUndersampling(const Findings& findings, const Estimate& estimate, const Stop& stop,
                       std::vector<Diagnostic>& diagnostics);
 
 }  // namespace polyest::internal

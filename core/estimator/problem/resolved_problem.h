@@ -116,7 +116,7 @@ class ResolvedProblem {
   const RowGate* gate() const { return gate_.get(); }
   // Whether the likelihood is that of the prediction errors of filters (process_noise.h), which
   // MakeEnsemble then specifies.
-  bool uses_filters() const { return UsesFilters(problem_); }
+  bool uses_filters() const { return uses_filters_; }
   // Returns the model whose states the ensembles have: the problem's, with states for parameters
   // that drift (drifting_model.h).
   const std::shared_ptr<const Model>& model() const { return model_; }
@@ -140,6 +140,7 @@ class ResolvedProblem {
   ResolvedProblem(Problem problem, Prior prior, int runs, int first_run)
       : problem_(std::move(problem)),
         prior_(std::move(prior)),
+        uses_filters_(UsesFilters(problem_)),
         runs_(runs),
         first_run_(first_run),
         settable_(problem_.model->description(), problem_),
@@ -153,6 +154,7 @@ class ResolvedProblem {
 
   Problem problem_;
   Prior prior_;
+  bool uses_filters_;
   int runs_;
   int first_run_;  // the first one whose parameters are among the uncertain ones
   int parameters_per_run_ = 0;

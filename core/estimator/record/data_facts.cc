@@ -137,7 +137,7 @@ void DataFacts::EndRun() {
 void DataFacts::Add(const RowBlock& block, int row, int channels) {
   const auto k = static_cast<size_t>(row);
   const auto m = static_cast<size_t>(channels);
-  const size_t width = block.values.size() / block.rows.size();
+  const size_t width = block.width();
   columns_.resize(width);
   inputs_.resize(width - m);
   if (run_ >= 0 && block.rows[k].run != run_ && ended_run_ != run_) EndRun();

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/estimator/record/row_block.h"
+
 namespace polyest::internal {
 
 namespace {
@@ -45,7 +47,7 @@ void RecordSummary::Channel::AddTime(const SampleRow& row) {
 void RecordSummary::Add(const RowBlock& block, int row, int channels) {
   const auto k = static_cast<size_t>(row);
   const auto m = static_cast<size_t>(channels);
-  const size_t width = block.values.size() / block.rows.size();
+  const size_t width = block.width();
   channels_.resize(m);
   facts_.Add(block, row, channels);
   for (size_t c = 0; c < m; ++c) {
@@ -60,12 +62,7 @@ void RecordSummary::Add(const RowBlock& block, int row, int channels) {
   ++rows_;
   const bool first_run = beginning_.rows.empty() || block.rows[k].run == beginning_.rows[0].run;
   if (!first_run || beginning_.count() >= kBeginning) return;
-  const auto values = block.values.begin() + static_cast<std::ptrdiff_t>(k * width);
-  const auto noise = block.noise.begin() + static_cast<std::ptrdiff_t>(k * m);
-  beginning_.rows.push_back(block.rows[k]);
-  beginning_.values.insert(beginning_.values.end(), values,
-                           values + static_cast<std::ptrdiff_t>(width));
-  beginning_.noise.insert(beginning_.noise.end(), noise, noise + static_cast<std::ptrdiff_t>(m));
+  AppendRows(block, row, 1, beginning_);
 }
 
 double RecordSummary::NoiseToSignal(const LearnedNoise& noise) const {

@@ -131,7 +131,7 @@ const std::vector<PointFailure>& RecordTrajectories::RunFailures() const {
 // asked for up to the last of them.
 absl::Status RecordTrajectories::Advance(const RowBlock& block, int first, int count, int64_t row,
                                          Visit visit, const Stop& stop) {
-  const size_t width = block.values.size() / block.rows.size();
+  const size_t width = block.width();
   const auto channels = static_cast<size_t>(problem_.channels());
   std::vector<TrajectoryInstant> instants;
   for (int k = first; k < first + count; ++k, ++row) {

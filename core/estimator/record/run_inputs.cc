@@ -16,7 +16,7 @@ constexpr int64_t kKnotRowsAtOnce = 64;
 
 // Adds the knots up to `time_s` in a block to their numbers, by input.
 void CountKnots(const RowBlock& block, double time_s, std::vector<int>& counts) {
-  const size_t width = block.values.size() / block.rows.size();
+  const size_t width = block.width();
   for (size_t row = 0; row < block.rows.size(); ++row) {
     if (block.rows[row].time_s > time_s) break;
     for (size_t i = 0; i < counts.size(); ++i) {
@@ -100,7 +100,7 @@ void RunInputs::AppendRow(size_t row) {
     finished_ = true;
     return;
   }
-  const size_t width = block_.values.size() / block_.rows.size();
+  const size_t width = block_.width();
   const size_t channels = width - streamed.size();
   last_row_s_ = block_.rows[row].time_s;
   for (size_t i = 0; i < streamed.size(); ++i) {

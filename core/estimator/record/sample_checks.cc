@@ -68,7 +68,7 @@ absl::Status CheckSize(const Samples& samples, const SampleColumn& column, size_
 RecordPosition After(const RecordPosition& position, const RowBlock& block) {
   RecordPosition after = position;
   const auto channels = static_cast<size_t>(position.largest.size());
-  const size_t width = block.rows.empty() ? 0 : block.values.size() / block.rows.size();
+  const size_t width = block.width();
   for (size_t k = 0; k < block.rows.size(); ++k) {
     const SampleRow& row = block.rows[k];
     const bool same_run = after.rows > 0 && row.run == after.run;

@@ -24,7 +24,7 @@ void Whitening::BeginRun() {
 }
 
 void Whitening::Apply(int first, int count, RowBlock& block, MatrixRef outputs) {
-  const size_t width = block.values.size() / block.rows.size();
+  const size_t width = block.width();
   const size_t m = channels_.size();
   const auto begin = static_cast<size_t>(first);
   for (size_t k = begin; k < begin + static_cast<size_t>(count); ++k) {

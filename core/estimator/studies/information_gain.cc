@@ -9,9 +9,7 @@
 
 namespace polyest::internal {
 
-Matrix DrawTruths(const Prior& prior, int count) {
-  return CollocationPoints(PointSet::kHalton, prior.germs(), 1, count, count).value();
-}
+Matrix DrawTruths(const Prior& prior, int count) { return HaltonDraws(prior.germs(), count); }
 
 TruthDraws::TruthDraws(const Prior& prior, Matrix xis)
     : prior_(prior),

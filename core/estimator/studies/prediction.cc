@@ -162,7 +162,7 @@ Matrix ThetasOfOtherRuns(const ResolvedProblem& own, const Matrix& thetas,
   const Prior& prior = other.prior();
   const auto draws = static_cast<int>(thetas.rows());
   // The points of Halton's sequence are distributed as the prior.
-  const Matrix xis = CollocationPoints(PointSet::kHalton, prior.germs(), 1, draws).value();
+  const Matrix xis = HaltonDraws(prior.germs(), draws);
   Matrix result(draws, prior.dimension());
   const std::vector<Eigen::Index> order = ScatteredOrder(draws);
   for (Eigen::Index d = 0; d < draws; ++d) {

@@ -13,9 +13,9 @@
 namespace polyest::internal {
 namespace {
 
-// Part of s², by which χ² falls in a linear model, that it must fall by.
+// In a linear model χ² falls by s². The model's own χ² must fall by at least this part of it.
 constexpr double kLeastGain = 0.5;
-constexpr double kLeastShift = 1;
+constexpr double kLeastShift = 1;       // of an estimate, in standard deviations, to be named
 constexpr double kNearlyAsLarge = 0.9;  // times the largest score
 constexpr size_t kMaxOthers = 3;
 

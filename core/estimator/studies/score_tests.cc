@@ -25,7 +25,8 @@ constexpr int kMaxPasses = 4;
 // Largest distance of an estimate from the minimum of the cost, in standard deviations. It is not 0
 // where the noise's correlation is unknown, since the estimate averages over that.
 constexpr double kMaxFromMinimum = 2;
-// Part of g that the uncertain parameters must leave, squared.
+// A quantity is not tested if the uncertain parameters can do all that it does, but for this part
+// of |g|².
 constexpr double kLeastOwn = 1e-6;
 
 bool HasPlainLikelihood(const MeasuredOutput& output) {

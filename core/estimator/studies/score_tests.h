@@ -39,7 +39,7 @@ struct ScoreTest {
   std::string name;
   std::string unit;
   double value = 0;        // that it is held at
-  double change = 0;       // s/√v: what the residuals ask for beside it
+  double change = 0;       // s/√v: by how much the residuals ask the value to change
   double deviation = 0;    // of the change, 1/√v
   double score = 0;        // s
   Vector shifts = {};      // of the estimate with that change, in its standard deviations (n)

@@ -7,9 +7,9 @@
 //   problem.uncertain = {polyest::UncertainParameter::Uniform("k", 30, 50).value()};
 //   problem.measured = {{.output = "x", .noise = {.absolute = 0.01}}};
 //   auto estimator = polyest::Estimator::Make(problem).value();
-//   estimator->Append(samples);     // as often as there are new ones
-//   estimator->Process();
-//   polyest::Estimate estimate = estimator->CurrentEstimate().value();
+//   absl::Status status = estimator->Append(samples);  // as often as there are new ones
+//   status.Update(estimator->Process());
+//   absl::StatusOr<polyest::Estimate> estimate = estimator->CurrentEstimate();
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>

@@ -1,7 +1,7 @@
 #pragma once
 
 // The logarithms of the posterior density and of the likelihood at given values of the parameters,
-// on the expansion, with exact derivatives. With the cost J (core/bayes/cost.h), the parameters
+// on the expansion, with exact derivatives. With the cost J (core/README.md), the parameters
 // θ = T(ξ) and the germs' prior density ρ,
 //   log posterior(θ) = −J − log |det ∂θ/∂ξ| + constant,   J = J_mismatch + α² J_apriori,
 //   log likelihood(θ) = −J_mismatch + constant,

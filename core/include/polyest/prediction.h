@@ -86,7 +86,7 @@ struct PredictionScore {
 
 // A sudden change of a parameter that drifts, which its random walk does not explain: if a step of
 // the parameter at this time is allowed beside the walk, the log likelihood rises by score²/2.
-// Source: de Jong and Penzer (1998), backward_pass.h.
+// Source: P. de Jong, J. Penzer, "Diagnosing shocks in time series", J. Am. Stat. Assoc. 93 (1998).
 struct AbruptChange {
   SampleRow at;      // the time, of those returned, at which the new value is there
   double score = 0;  // its sign is that of the step; ~ N(0, 1) at each time if the parameter walks

@@ -53,6 +53,8 @@ struct RowBlock {
 
   // The number of rows.
   int count() const { return static_cast<int>(rows.size()); }
+  // The number of columns of `values`; 0 without rows.
+  size_t width() const { return rows.empty() ? 0 : values.size() / rows.size(); }
 };
 
 // Keeps the rows of a record, so that a moved expansion can be computed over them again. An

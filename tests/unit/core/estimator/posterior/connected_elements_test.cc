@@ -73,5 +73,16 @@ TEST(ConnectedPieces, AreNotElementsThatOverlapWhereOneHasAHighCost) {
   EXPECT_EQ(elements.Pieces(), (std::vector<size_t>{0, 1}));
 }
 
+// Along the line they stand in the order 0, 3, 1, 2: the last one joins the first with a piece of
+// two.
+TEST(ConnectedPieces, AreThoseThatAnElementJoinsLater) {
+  Elements elements;
+  elements.Add(-1, -0.5, {Line, 0, 2});
+  elements.Add(0, 0.5, {Line, 0, 2});
+  elements.Add(0.5, 1, {Line, 0, 2});
+  elements.Add(-0.5, 0, {Line, 0, 2});
+  EXPECT_EQ(elements.Pieces(), (std::vector<size_t>{0, 0, 0, 0}));
+}
+
 }  // namespace
 }  // namespace polyest::internal::connected_elements

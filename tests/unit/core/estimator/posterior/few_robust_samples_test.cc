@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/bayes/noise.h"
+#include "core/common/types.h"
 #include "tests/unit/core/estimator/text_problem.h"
 
 namespace polyest::internal::few_robust_samples_test {
