@@ -172,8 +172,10 @@ RunScore PopulationCost::PopulationAt(const ConstVectorRef& xi) const {
   return PopulationOfGerms(xi[mean_], xi[spread_]);
 }
 
-const ScoreMixture* PopulationCost::ShapeOf(Eigen::Index run) const {
+// Returns the shape of a run's posterior, or nothing where that counts as a Gaussian.
+const ScoreMixture* PopulationCost::ShapeOf(Eigen::Index run, const RunScore& population) const {
   if (run >= std::ssize(shapes_)) return nullptr;
+  if (variance_[run] < kNarrow * kNarrow * population.variance) return nullptr;
   const ScoreMixture& shape = shapes_[static_cast<size_t>(run)];
   return shape.log_weights.size() > 0 ? &shape : nullptr;
 }
@@ -186,7 +188,7 @@ double PopulationCost::Evaluate(const ConstVectorRef& xi, double power) const {
   double sum = 0;
   for (Eigen::Index r = 0; r < base_.size(); ++r) {
     const double c = base_[r] + scores[r], S = variance_[r], share = PowerOf(r, power);
-    if (const ScoreMixture* shape = ShapeOf(r)) {
+    if (const ScoreMixture* shape = ShapeOf(r, population)) {
       sum += 2 * share * MixtureValue(c, *shape, population);
       continue;
     }
@@ -207,7 +209,7 @@ PopulationCost::Derivatives PopulationCost::Differentiate(const ConstVectorRef& 
   sum.gradient.setZero();
   sum.hessian.setZero();
   for (Eigen::Index r = 0; r < runs; ++r) {
-    const ScoreMixture* shape = ShapeOf(r);
+    const ScoreMixture* shape = ShapeOf(r, population);
     RunTerm term = shape != nullptr ? MixtureTerm(scores[r], *shape, population)
                                     : GaussianTerm(scores[r], variance_[r], population);
     term.gradient *= PowerOf(r, power);
