@@ -49,6 +49,25 @@ Element Element::Freed(const std::vector<const Element*>& others,
   return freed;
 }
 
+Element Element::AlongGerms(const std::vector<int>& germs) const {
+  Element along;
+  for (const Bound& bound : bounds_) {
+    Vector normal = Vector::Zero(bound.normal.size());
+    normal(germs) = bound.normal(germs);
+    if (normal == bound.normal) along.bounds_.push_back(bound);
+  }
+  return along;
+}
+
+bool Element::HasBoundsOf(const Element& other) const {
+  const auto is_in_other = [&](const Bound& bound) {
+    return std::ranges::any_of(other.bounds_, [&](const Bound& one) {
+      return one.offset == bound.offset && one.normal == bound.normal;
+    });
+  };
+  return bounds_.size() == other.bounds_.size() && std::ranges::all_of(bounds_, is_in_other);
+}
+
 Element Element::WithDimension(Eigen::Index dimension) const {
   Element extended;
   for (const Bound& bound : bounds_) {

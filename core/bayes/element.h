@@ -48,6 +48,10 @@ class Element {
   // particles (a row each) press. It then has the place of those that are gone, and still only
   // hyperplanes in common with the others.
   Element Freed(const std::vector<const Element*>& others, const ConstMatrixRef& particles) const;
+  // Returns the element without the bounds that depend on any germ but the given ones.
+  Element AlongGerms(const std::vector<int>& germs) const;
+  // Whether both have the same bounds, in any order.
+  bool HasBoundsOf(const Element& other) const;
   // Returns the same part of a space with more dimensions, unbounded in the new ones.
   Element WithDimension(Eigen::Index dimension) const;
 

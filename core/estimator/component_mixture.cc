@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <numeric>
 #include <optional>
 #include <utility>
 
@@ -62,9 +63,18 @@ absl::Status ComponentMixture::TakeUpTo(int64_t rows, const Stop& stop) {
     const bool weighs = components_.size() > 1 && weighing_row_ <= rows;
     POLYEST_ASSIGN_OR_RETURN(const bool divided, TakeOrDivide(weighs ? weighing_row_ : rows, stop));
     if (divided) continue;
-    if (!weighs) return absl::OkStatus();
-    POLYEST_RETURN_IF_ERROR(Weigh(stop));
+    if (AwaitsRun()) {
+      POLYEST_RETURN_IF_ERROR(BeginRun(stop));
+    } else if (weighs) {
+      POLYEST_RETURN_IF_ERROR(Weigh(stop));
+    } else {
+      return absl::OkStatus();
+    }
   }
+}
+
+bool ComponentMixture::AwaitsRun() const {
+  return std::ranges::any_of(components_, [](const auto& one) { return one->awaits_run(); });
 }
 
 int64_t ComponentMixture::rows_taken() const {
@@ -114,13 +124,71 @@ absl::Status ComponentMixture::Divide(size_t component, const Stop& stop) {
     const auto room = static_cast<size_t>(whole.room());
     POLYEST_RETURN_IF_ERROR(KeepHeaviest(parts, whole.weight(), room, stop).status());
   }
-  if (components_.size() == 1) weighing_row_ = NextWindow(whole.rows_taken());
+  if (components_.size() == 1) weighing_row_ = NextWeighing(whole.rows_taken());
   Retire(whole);
   const auto place =
       components_.erase(components_.begin() + static_cast<std::ptrdiff_t>(component));
   components_.insert(place, std::make_move_iterator(parts.begin()),
                      std::make_move_iterator(parts.end()));
   return absl::OkStatus();
+}
+
+// Begins the run that the components await. After a stop some of them have begun it.
+absl::Status ComponentMixture::BeginRun(const Stop& stop) {
+  if (components_.size() > 1 && united_row_ != rows_taken()) {
+    POLYEST_RETURN_IF_ERROR(UniteBeforeRun(stop));
+  }
+  for (size_t k = 0; k < components_.size();) {
+    const absl::Status begun =
+        components_[k]->awaits_run() ? components_[k]->BeginAwaitedRun(stop) : absl::OkStatus();
+    if (IsInfeasible(begun) && components_.size() > 1) {
+      LeaveOut(k);
+      continue;
+    }
+    POLYEST_RETURN_IF_ERROR(begun);
+    ++k;
+  }
+  return absl::OkStatus();
+}
+
+// Replaces components that differ in the parameters of the ended run alone by one of them, which
+// goes on for all: without these parameters they are the same posterior, several times, and the new
+// run would divide each of them again. Separate modes of the ended run's parameters stay apart.
+absl::Status ComponentMixture::UniteBeforeRun(const Stop& stop) {
+  POLYEST_ASSIGN_OR_RETURN(const std::vector<Matrix> particles, KeepComparable(stop));
+  FreeBounds(particles);
+  const std::vector<std::vector<size_t>> groups =
+      GroupsWithoutLastRun(Requests(components_), particles, stop);
+  POLYEST_RETURN_IF_ERROR(stop.Check());
+  Components kept;
+  for (const std::vector<size_t>& group : groups) kept.push_back(Represent(group, particles));
+  for (const auto& component : components_) {
+    if (component) Retire(*component);
+  }
+  components_ = std::move(kept);
+  ShareRoom();
+  united_row_ = rows_taken();
+  weighing_row_ = NextWindow(united_row_, united_row_);
+  return absl::OkStatus();
+}
+
+// Takes the heaviest component of the group, which goes on for all of it.
+std::unique_ptr<MixtureComponent> ComponentMixture::Represent(
+    const std::vector<size_t>& group, const std::vector<Matrix>& particles) {
+  std::vector<Matrix> own;
+  std::vector<double> weights;
+  for (const size_t k : group) {
+    own.push_back(particles[k]);
+    weights.push_back(components_[k]->weight());
+  }
+  const double weight = std::accumulate(weights.begin(), weights.end(), 0.0);
+  for (double& one : weights) one /= weight;
+  const auto heaviest = std::ranges::max_element(weights) - weights.begin();
+  std::unique_ptr<MixtureComponent> kept =
+      std::move(components_[group[static_cast<size_t>(heaviest)]]);
+  kept->set_weight(weight);
+  if (group.size() > 1) kept->GoOnFor(PooledParticles(own, weights));
+  return kept;
 }
 
 // Leaves out an element in which too few trajectories can be integrated to go on.
@@ -137,19 +205,36 @@ void ComponentMixture::Retire(const MixtureComponent& component) {
 }
 
 absl::Status ComponentMixture::Weigh(const Stop& stop) {
+  POLYEST_ASSIGN_OR_RETURN(const std::vector<Matrix> particles, KeepComparable(stop));
+  POLYEST_RETURN_IF_ERROR(Unite(particles, stop));
+  FreeBounds(particles);
+  ShareRoom();
+  weighing_row_ = NextWeighing(weighing_row_);
+  return absl::OkStatus();
+}
+
+// Weighs all components, keeps those that matter, and returns the particles of each.
+absl::StatusOr<std::vector<Matrix>> ComponentMixture::KeepComparable(const Stop& stop) {
   for (const auto& component : components_) {
     POLYEST_RETURN_IF_ERROR(component->MakeComparable(stop));
   }
   const int max_components = MaxComponents(components_.front()->problem());
-  POLYEST_ASSIGN_OR_RETURN(const std::vector<Matrix> particles,
-                           KeepHeaviest(components_, 1, static_cast<size_t>(max_components), stop));
-  POLYEST_RETURN_IF_ERROR(Unite(particles, stop));
-  FreeBounds(particles);
+  return KeepHeaviest(components_, 1, static_cast<size_t>(max_components), stop);
+}
+
+// Divides the room among the components.
+void ComponentMixture::ShareRoom() {
+  const int all = MaxComponents(components_.front()->problem());
   for (const auto& component : components_) {
-    component->set_room(std::max(1, max_components / static_cast<int>(components_.size())));
+    component->set_room(std::max(1, all / static_cast<int>(components_.size())));
   }
-  weighing_row_ = NextWindow(weighing_row_);
-  return absl::OkStatus();
+}
+
+// Returns the row of the next weighing after one. Windows are counted from where the present run
+// has begun, if earlier ones have lost their own parameters: it divides the posterior anew.
+int64_t ComponentMixture::NextWeighing(int64_t row) const {
+  const EndedRuns* ended = components_.front()->problem().ended_runs();
+  return NextWindow(row, ended != nullptr ? ended->rows : 0);
 }
 
 // Replaces the components by a single one if its expansion represents the posterior as well.

@@ -5,7 +5,8 @@
 // There is one component at first, and as long as one expansion suffices. Components are added and
 // dropped only at rows that are a function of the record alone, with all components at the same
 // row. When one component is divided, only its parts are weighed. All components are weighed only
-// where a window of the mixture ends.
+// where a window of the mixture ends, and before a run for which the ended ones lose their own
+// parameters.
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
@@ -60,7 +61,15 @@ class ComponentMixture {
 
   absl::StatusOr<bool> TakeOrDivide(int64_t rows, const Stop& stop);
   absl::Status Divide(size_t component, const Stop& stop);
+  bool AwaitsRun() const;
+  absl::Status BeginRun(const Stop& stop);
+  absl::Status UniteBeforeRun(const Stop& stop);
+  std::unique_ptr<MixtureComponent> Represent(const std::vector<size_t>& group,
+                                              const std::vector<Matrix>& particles);
   absl::Status Weigh(const Stop& stop);
+  absl::StatusOr<std::vector<Matrix>> KeepComparable(const Stop& stop);
+  void ShareRoom();
+  int64_t NextWeighing(int64_t row) const;
   absl::StatusOr<std::vector<Matrix>> KeepHeaviest(Components& components, double weight,
                                                    size_t max_kept, const Stop& stop);
   absl::Status Unite(const std::vector<Matrix>& particles, const Stop& stop);
@@ -72,6 +81,7 @@ class ComponentMixture {
 
   Components components_;
   int64_t weighing_row_ = 0;   // row of the next weighing, if there are several components
+  int64_t united_row_ = -1;    // before which components were last united for a new run
   double left_out_ = 0;        // largest share of components dropped for lack of room
   int elements_left_out_ = 0;  // because too few of their trajectories could be integrated
   int reexpansions_ = 0;       // by components that no longer exist

@@ -141,13 +141,7 @@ ExpansionDesign DesignAfterEndedRuns(const ResolvedProblem& problem, const Vecto
   const Particles checks = DrawsForNewRun(problem, centre, factor, CheckCount(n));
   SetDrawnChecks(checks.etas, checks.costs, design);
   // Bounds along the own germs of earlier runs say nothing of this one's.
-  std::vector<Element::Bound> bounds;
-  for (const Element::Bound& bound : present.bounds()) {
-    Vector normal = Vector::Zero(n);
-    normal(shared) = bound.normal(shared);
-    if (normal == bound.normal.head(n)) bounds.push_back({normal, bound.offset});
-  }
-  design.element = Element(std::move(bounds));
+  design.element = present.AlongGerms(shared);
   return design;
 }
 

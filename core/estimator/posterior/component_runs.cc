@@ -159,15 +159,25 @@ absl::StatusOr<int64_t> MixtureComponent::EliminateAll(const Matrix& particles, 
   return propagated;
 }
 
+absl::Status MixtureComponent::BeginAwaitedRun(const Stop& stop) {
+  POLYEST_RETURN_IF_ERROR(BeginRunAlone(*awaited_run_, stop));
+  awaited_run_.reset();
+  awaiting_.reset();
+  return absl::OkStatus();
+}
+
 absl::Status MixtureComponent::BeginRunAlone(int run, const Stop& stop) {
   POLYEST_ASSIGN_OR_RETURN(ResolvedProblem next, problem_.OfRun(run));
-  std::optional<GermSummary> posterior = GaussianPosterior(stop);
-  POLYEST_RETURN_IF_ERROR(stop.Check());
-  std::optional<Matrix> particles;
-  if (!posterior) {
-    POLYEST_ASSIGN_OR_RETURN(particles, ParticlesNow(stop));
-    posterior = SummaryOf(*particles);
+  std::optional<Matrix> particles = awaiting_;
+  std::optional<GermSummary> posterior;
+  if (!particles) {
+    posterior = GaussianPosterior(stop);
+    POLYEST_RETURN_IF_ERROR(stop.Check());
+    if (!posterior) {
+      POLYEST_ASSIGN_OR_RETURN(particles, ParticlesNow(stop));
+    }
   }
+  if (!posterior) posterior = SummaryOf(*particles);
   const EndedRuns* before = problem_.ended_runs();
   const bool holds = before != nullptr && HoldsAbout(*before, Shared(problem_, *posterior)) &&
                      HoldsWith(*before, expansion_->noise());
@@ -228,6 +238,7 @@ absl::Status MixtureComponent::GoOnWith(ResolvedProblem next, const GermSummary&
   POLYEST_RETURN_IF_ERROR(
       ReplayAs(std::move(next), std::move(design), std::move(noise), std::move(draws), stop));
   schedule_.CountAnewFrom(taken_);
+  bisected_ = bisected_ && !element().bounds().empty();
   return absl::OkStatus();
 }
 

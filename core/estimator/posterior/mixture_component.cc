@@ -55,7 +55,7 @@ absl::StatusOr<std::unique_ptr<MixtureComponent>> MixtureComponent::OfPrior(
 }
 
 absl::Status MixtureComponent::TakeUpTo(int64_t rows, const Stop& stop) {
-  if (must_divide()) return absl::OkStatus();
+  if (must_divide() || awaits_run()) return absl::OkStatus();
   POLYEST_RETURN_IF_ERROR(Recover(stop));
   // An earlier stop may have left the end of a window unprocessed.
   POLYEST_RETURN_IF_ERROR(FinishRow(stop).status());
@@ -63,6 +63,7 @@ absl::Status MixtureComponent::TakeUpTo(int64_t rows, const Stop& stop) {
   while (taken_ < rows && !must_divide()) {
     POLYEST_RETURN_IF_ERROR(stop.Check());
     POLYEST_RETURN_IF_ERROR(ReadBlock(rows, block, stop));
+    if (awaits_run()) return absl::OkStatus();
     broken_ = true;
     POLYEST_RETURN_IF_ERROR(expansion_->Propagate(block, stop));
     POLYEST_ASSIGN_OR_RETURN(const bool through, AbsorbBlock(block, stop));
@@ -71,13 +72,19 @@ absl::Status MixtureComponent::TakeUpTo(int64_t rows, const Stop& stop) {
   return WithdrawTempering(stop);
 }
 
-// Reads the next rows, up to the first `rows` of the store, as far as the runs' parameters exist.
+// Reads the next rows, up to the first `rows` of the store, as far as the runs' parameters exist,
+// or finds that a run is to be awaited.
 absl::Status MixtureComponent::ReadBlock(int64_t rows, RowBlock& block, const Stop& stop) {
   const int64_t count = std::min(kBlockRows, rows - taken_);
   const auto read = [&](int64_t some) { return store_->Read(taken_, some, block); };
   POLYEST_RETURN_IF_ERROR(read(count));
-  if (problem_.per_run() && block.rows.front().run >= problem_.runs()) {
-    POLYEST_RETURN_IF_ERROR(BeginRun(block.rows.front().run, stop));
+  const int run = block.rows.front().run;
+  if (problem_.per_run() && run >= problem_.runs()) {
+    if (run >= problem_.max_joint_runs()) {
+      awaited_run_ = run;
+      return absl::OkStatus();
+    }
+    POLYEST_RETURN_IF_ERROR(BeginRun(run, stop));
   }
   int64_t known = 0;
   while (known < count &&
@@ -90,7 +97,6 @@ absl::Status MixtureComponent::ReadBlock(int64_t rows, RowBlock& block, const St
 
 // Replays the record so far with the parameters of the new run, as uncertain as their prior.
 absl::Status MixtureComponent::BeginRun(int run, const Stop& stop) {
-  if (run >= problem_.max_joint_runs()) return BeginRunAlone(run, stop);
   POLYEST_ASSIGN_OR_RETURN(ResolvedProblem grown, problem_.WithRuns(run + 1));
   POLYEST_ASSIGN_OR_RETURN(ExpansionDesign design, DesignForNewRuns(grown, expansion_->design()));
   LearnedNoise noise = expansion_->noise().ForNewExpansion();

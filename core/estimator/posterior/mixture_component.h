@@ -75,6 +75,15 @@ class MixtureComponent {
   absl::StatusOr<std::unique_ptr<MixtureComponent>> Unite(const Piece& whole, const Stop& stop);
   // Whether the division is a bisection. Its halves need no weighing before they have taken more.
   bool bisects() const { return halves_; }
+  // Whether the next row begins a run before which the ended ones lose their own parameters. No
+  // more rows are taken until BeginAwaitedRun has been called.
+  bool awaits_run() const { return awaited_run_.has_value(); }
+  // Lets that run begin with the posterior of several components, of which these are particles (W ×
+  // n, germ coordinates).
+  void GoOnFor(Matrix particles) { awaiting_ = std::move(particles); }
+  // Begins that run. Returns InfeasibleError when a run that has ended cannot be expanded. After a
+  // stop the call may be repeated.
+  absl::Status BeginAwaitedRun(const Stop& stop);
   // The number of components that this one may become by divisions.
   int room() const { return room_; }
   void set_room(int room) { room_ = room; }
@@ -201,6 +210,8 @@ class MixtureComponent {
   bool last_row_too_coarse_ = false;  // whether the last row was too coarse and not dealt with yet
   bool halves_ = false;               // whether to divide into the halves of a bisection
   bool bisected_ = false;             // whether it came from a bisection; its order stays low
+  std::optional<int> awaited_run_;    // which begins with the next row
+  std::optional<Matrix> awaiting_;    // particles of the posterior with which it begins, if not own
   int room_ = 1;
   double weight_ = 1;
   int64_t taken_ = 0;

@@ -6,9 +6,12 @@
 #include <numeric>
 #include <utility>
 
+#include "core/bayes/cost_minima.h"
 #include "core/bayes/weighted_samples.h"
 #include "core/common/infeasible.h"
 #include "core/common/status.h"
+#include "core/estimator/expansion/search_domain.h"
+#include "core/estimator/posterior/connected_elements.h"
 #include "core/estimator/posterior/max_log_evidence.h"
 
 namespace polyest::internal {
@@ -21,6 +24,8 @@ constexpr PosteriorEffort kWeighingEffort = {
 constexpr int kParticlesKept = 1'000;
 // Up to this many components are all weighed by draws.
 constexpr size_t kFew = 4;
+// Starts of the search for the least cost of an element, beside particles of its posterior.
+constexpr int kStartsInElement = 3;
 
 // The posterior of one component, as far as its weight needs it.
 struct Weighed {
@@ -119,6 +124,30 @@ class Weighing {
   std::vector<Weighed> weighed_;
 };
 
+// Returns the index of each component's piece of the posterior.
+std::vector<size_t> PieceOfEach(const std::vector<AssessmentRequest>& requests,
+                                const std::vector<Matrix>& particles, const Stop& stop) {
+  std::vector<Cost> costs;
+  for (const AssessmentRequest& request : requests) {
+    costs.push_back(request.expansion->MakeCost(request.problem->problem().regularization));
+    costs.back().set_power(CommonPower(requests));
+  }
+  std::vector<ElementCost> elements;
+  for (size_t k = 0; k < requests.size(); ++k) {
+    const ExpansionDesign& design = requests[k].expansion->design();
+    Matrix starts = design.reference.transpose();
+    if (particles[k].rows() > 0) {
+      const Matrix etas = design.region.ManyToLocal(particles[k]);
+      Vector totals;
+      costs[k].EvaluateMany(etas, totals);
+      starts = SpreadStarts(etas, totals, kStartsInElement);
+    }
+    elements.push_back({&design, &costs[k], HeightOf(*requests[k].expansion, costs[k]),
+                        FindMinimaOf(costs[k], SearchOf(costs[k], design), starts, stop).front()});
+  }
+  return ConnectedPieces(elements);
+}
+
 }  // namespace
 
 double CommonPower(const std::vector<AssessmentRequest>& requests) {
@@ -127,6 +156,29 @@ double CommonPower(const std::vector<AssessmentRequest>& requests) {
     misfit = std::min(misfit, request.expansion->noise().misfit);
   }
   return 1 / misfit;
+}
+
+std::vector<std::vector<size_t>> GroupsWithoutLastRun(
+    const std::vector<AssessmentRequest>& requests, const std::vector<Matrix>& particles,
+    const Stop& stop) {
+  const std::vector<size_t> pieces = PieceOfEach(requests, particles, stop);
+  const std::vector<int> shared = requests.front().problem->SharedParameters();
+  std::vector<Element> along;
+  for (const AssessmentRequest& request : requests) {
+    along.push_back(request.expansion->design().element.AlongGerms(shared));
+  }
+  std::vector<std::vector<size_t>> groups;
+  for (size_t k = 0; k < requests.size(); ++k) {
+    const auto group = std::ranges::find_if(groups, [&](const std::vector<size_t>& one) {
+      return pieces[one.front()] == pieces[k] && along[one.front()].HasBoundsOf(along[k]);
+    });
+    if (group == groups.end()) {
+      groups.push_back({k});
+    } else {
+      group->push_back(k);
+    }
+  }
+  return groups;
 }
 
 absl::StatusOr<MixtureWeighing> WeighMixture(const std::vector<AssessmentRequest>& requests,

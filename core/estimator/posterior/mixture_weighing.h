@@ -26,6 +26,14 @@ struct MixtureWeighing {
 absl::StatusOr<MixtureWeighing> WeighMixture(const std::vector<AssessmentRequest>& requests,
                                              size_t max_kept, const Stop& stop);
 
+// Returns the components, by their indices, that are the same posterior once the parameters of the
+// last run are integrated out: those that have the same bounds along the shared germs, and belong
+// to the same piece of the posterior (connected_elements.h). `particles` are those of the
+// components. Takes requests as WeighMixture does. After a stop request the result means nothing.
+std::vector<std::vector<size_t>> GroupsWithoutLastRun(
+    const std::vector<AssessmentRequest>& requests, const std::vector<Matrix>& particles,
+    const Stop& stop);
+
 // Returns the power of the likelihood of the component that the residuals contradict least.
 double CommonPower(const std::vector<AssessmentRequest>& requests);
 

@@ -175,21 +175,14 @@ class PieceFinder {
 
 }  // namespace
 
-std::optional<Piece> UnitePieces(const std::vector<Matrix>& particles,
-                                 const std::vector<double>& weights) {
-  // Components of which none has evidence have no particles.
-  if (std::ranges::any_of(particles, [](const Matrix& own) { return own.rows() == 0; })) {
-    return std::nullopt;
-  }
-  Vector log_volumes(std::ssize(particles));
+Matrix PooledParticles(const std::vector<Matrix>& particles, const std::vector<double>& weights) {
   std::vector<Matrix> shares;
   Eigen::Index count = 0;
   for (size_t k = 0; k < particles.size(); ++k) {
-    log_volumes[static_cast<Eigen::Index>(k)] = RegionOfParticles(particles[k]).LogVolume();
-    const auto own = static_cast<double>(particles[k].rows());
-    const auto share = static_cast<Eigen::Index>(std::ceil(weights[k] * own));
+    const Eigen::Index own = particles[k].rows();
+    const auto share = static_cast<Eigen::Index>(std::ceil(weights[k] * static_cast<double>(own)));
     // Every so many-th, since the particles may be ordered.
-    const Eigen::Index stride = std::max<Eigen::Index>(1, particles[k].rows() / share);
+    const Eigen::Index stride = std::max<Eigen::Index>(1, own / std::max<Eigen::Index>(1, share));
     shares.push_back(particles[k](Eigen::seqN(0, share, stride), Eigen::all));
     count += share;
   }
@@ -199,6 +192,20 @@ std::optional<Piece> UnitePieces(const std::vector<Matrix>& particles,
     pooled.middleRows(row, share.rows()) = share;
     row += share.rows();
   }
+  return pooled;
+}
+
+std::optional<Piece> UnitePieces(const std::vector<Matrix>& particles,
+                                 const std::vector<double>& weights) {
+  // Components of which none has evidence have no particles.
+  if (std::ranges::any_of(particles, [](const Matrix& own) { return own.rows() == 0; })) {
+    return std::nullopt;
+  }
+  Vector log_volumes(std::ssize(particles));
+  for (size_t k = 0; k < particles.size(); ++k) {
+    log_volumes[static_cast<Eigen::Index>(k)] = RegionOfParticles(particles[k]).LogVolume();
+  }
+  Matrix pooled = PooledParticles(particles, weights);
   Region region = RegionOfParticles(pooled);
   const double largest = log_volumes.maxCoeff();
   const double together = largest + std::log((log_volumes.array() - largest).exp().sum());

@@ -44,6 +44,10 @@ struct Piece {
 std::vector<Piece> FindPieces(const Cost& cost, const ExpansionDesign& design,
                               const Matrix& particles);
 
+// Returns particles of all components (each W × n, germ coordinates), in proportion to the
+// components' weights (Σ = 1).
+Matrix PooledParticles(const std::vector<Matrix>& particles, const std::vector<double>& weights);
+
 // Returns a piece of all of Ω around the particles of all components (each W × n, germ
 // coordinates), drawn from in proportion to the components' weights (Σ = 1), if a region around all
 // of them has not much more volume than regions around each. Otherwise they are separate and

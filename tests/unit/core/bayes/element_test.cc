@@ -49,5 +49,22 @@ TEST(Element, IsNotBoundedInNewDimensions) {
   EXPECT_FALSE(half.Contains(Vector{{0.6, 0}}));
 }
 
+TEST(Element, KeepsTheBoundsAlongGivenGermsAlone) {
+  const Element first({{Vector{{1, 0, 0}}, 0.5}, {Vector{{0, 1, 0}}, 2}, {Vector{{1, 0, 1}}, 0}});
+  const Element second({{Vector{{0, 1, 0}}, 2}, {Vector{{-1, 0, 0}}, -0.5}});
+  EXPECT_FALSE(first.HasBoundsOf(second));
+  const std::vector<int> shared = {1, 2};
+  EXPECT_TRUE(first.AlongGerms(shared).HasBoundsOf(second.AlongGerms(shared)));
+  EXPECT_EQ(first.AlongGerms(shared).bounds().size(), 1u);
+  EXPECT_EQ(first.AlongGerms({0, 2}).bounds().size(), 2u);
+}
+
+TEST(Element, HasTheBoundsOfAnotherInAnyOrder) {
+  const Element::Bound a{Vector{{1, 0}}, 1}, b{Vector{{0, 1}}, 2}, c{Vector{{0, 1}}, 3};
+  EXPECT_TRUE(Element({a, b}).HasBoundsOf(Element({b, a})));
+  EXPECT_FALSE(Element({a, b}).HasBoundsOf(Element({a, c})));
+  EXPECT_FALSE(Element({a}).HasBoundsOf(Element({a, b})));
+}
+
 }  // namespace
 }  // namespace polyest::internal
