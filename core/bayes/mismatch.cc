@@ -97,6 +97,13 @@ double ChannelSums::Lag1Correlation(const ConstVectorRef& d) const {
                               : LagCorrelation(samples.ChiSquared(d), differences.ChiSquared(d));
 }
 
+// It is χ² + L with known noise, and χ² e^{L/N} with an unknown scale.
+double ChannelSums::WithLogVariance(double chi_squared, double logs) const {
+  if (!scale_unknown) return chi_squared + logs;
+  const double degrees = Degrees();
+  return degrees > 0 ? chi_squared * std::exp(logs / degrees) : chi_squared;
+}
+
 struct Mismatch::Sums {
   // A channel whose noise is not known. What is factored of it points to its sums.
   struct Channel {
@@ -106,6 +113,18 @@ struct Mismatch::Sums {
     ChannelSums sums;
     FactoredSums samples;
     FactoredSums differences;
+  };
+
+  // A channel of relative noise while its samples are few.
+  struct Relative {
+    double degrees = 0;
+    bool scale_unknown = false;
+    RelativeSamples samples;
+
+    // Returns the likelihood as a function of A; ½ L is to be added. For `factor` see Evaluate.
+    Likelihood Of(double chi_squared, double factor = 1) const {
+      return polyest::internal::Evaluate(factor * degrees, chi_squared, 0, scale_unknown, false);
+    }
   };
 
   explicit Sums(MismatchSums all_known) : known(std::move(all_known)), count(known.count()) {}
@@ -120,7 +139,8 @@ struct Mismatch::Sums {
   double log_variance_at_reference = 0;
   std::deque<Channel> others;
   std::vector<RobustSamples> kept;  // of channels with outliers while their samples are few
-  int64_t count = 0;                // of samples, over all channels
+  std::vector<Relative> relative;
+  int64_t count = 0;  // of samples, over all channels
 };
 
 Mismatch::Mismatch(MismatchSums known) {
@@ -129,9 +149,10 @@ Mismatch::Mismatch(MismatchSums known) {
   sums_ = std::move(sums);
 }
 
-Mismatch::Mismatch(const std::vector<ChannelSums>& channels,
-                   const std::vector<RobustSamples>& kept) {
+Mismatch::Mismatch(const std::vector<ChannelSums>& channels, const std::vector<RobustSamples>& kept,
+                   const std::vector<RelativeSamples>& relative) {
   POLYEST_CHECK(!channels.empty() && (kept.empty() || kept.size() == channels.size()));
+  POLYEST_CHECK(relative.empty() || relative.size() == channels.size());
   auto sums = std::make_shared<Sums>(MismatchSums(channels.front().samples.terms()));
   for (size_t c = 0; c < channels.size(); ++c) {
     const ChannelSums& channel = channels[c];
@@ -139,6 +160,11 @@ Mismatch::Mismatch(const std::vector<ChannelSums>& channels,
     if (!kept.empty() && kept[c].outliers() != OutlierHandling::kNone) {
       POLYEST_CHECK(channel.IsKnown());
       sums->kept.push_back(kept[c]);
+      continue;
+    }
+    if (!relative.empty() && relative[c].keeps()) {
+      POLYEST_CHECK(!channel.correlation_unknown);
+      sums->relative.push_back({channel.Degrees(), channel.scale_unknown, relative[c]});
       continue;
     }
     if (!channel.IsKnown()) {
@@ -174,6 +200,10 @@ double Mismatch::Evaluate(const ConstVectorRef& d) const {
         polyest::internal::Evaluate(channel.sums, channel.samples.ChiSquared(d), differences).value;
   }
   for (const RobustSamples& samples : sums.kept) value += samples.Evaluate(d);
+  for (const Sums::Relative& channel : sums.relative) {
+    const RelativeSamples::Totals totals = channel.samples.At(d);
+    value += channel.Of(totals.chi_squared).value + 0.5 * totals.log_variance;
+  }
   return value;
 }
 
@@ -207,6 +237,13 @@ double Mismatch::EvaluateWithGradient(const ConstVectorRef& d, VectorRef gradien
   for (const RobustSamples& samples : sums.kept) {
     value += samples.EvaluateAddingGradient(d, gradient);
   }
+  for (const Sums::Relative& channel : sums.relative) {
+    const RelativeSamples::Totals totals =
+        channel.samples.WithGradients(d, by_samples, by_differences);
+    const Likelihood l = channel.Of(totals.chi_squared);
+    value += l.value + 0.5 * totals.log_variance;
+    gradient += l.by_a * by_samples + 0.5 * by_differences;
+  }
   return value;
 }
 
@@ -220,6 +257,14 @@ Matrix Mismatch::Curvature(const ConstVectorRef& d, const ConstMatrixRef& phi_gr
   const double factor =
       std::max(0.1, 1 - spent / static_cast<double>(std::max<int64_t>(1, sums.count)));
   Vector gradient(d.size());
+  for (const Sums::Relative& channel : sums.relative) {
+    Vector unused(d.size());
+    const double a = channel.samples.WithGradients(d, gradient, unused).chi_squared;
+    const Vector by_a = phi_gradient.transpose() * gradient;
+    const Likelihood l = channel.Of(a, factor);
+    curvature +=
+        channel.samples.Curvature(d, phi_gradient, l.by_a, 0.5) + l.by_aa * by_a * by_a.transpose();
+  }
   for (const Sums::Channel& channel : sums.others) {
     const bool correlation_unknown = channel.sums.correlation_unknown;
     const double a = channel.samples.ChiSquaredWithGradient(d, gradient);
@@ -258,6 +303,12 @@ void Mismatch::EvaluateMany(const ConstMatrixRef& differences, Matrix& product,
   thread_local Vector a, d;  // kept from call to call, so that a sampler's sweeps do not allocate
   a.resize(values.size());
   d.resize(values.size());
+  for (const Sums::Relative& channel : sums.relative) {
+    channel.samples.EvaluateMany(differences, product, a, d);
+    for (Eigen::Index i = 0; i < values.size(); ++i) {
+      values[i] += channel.Of(a[i]).value + 0.5 * d[i];
+    }
+  }
   for (const Sums::Channel& channel : sums.others) {
     const bool correlation_unknown = channel.sums.correlation_unknown;
     channel.samples.ChiSquaredMany(differences, product, a);

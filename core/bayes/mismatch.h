@@ -16,8 +16,9 @@
 // prior for a: ∫ e^{−½ Σ (u_k − a u_{k−1})²} da gives the last two lines. The constants are chosen
 // so that a working noise of the right size gives N/2 in all cases.
 //
-// While a channel with outliers has few samples, −log of their likelihood is taken sample by sample
-// (robust_samples.h) and not from its sums, which hold near one point only.
+// While a channel with outliers or with noise relative to the prediction has few samples, −log of
+// their likelihood is taken sample by sample (robust_samples.h, relative_samples.h) and not from
+// its sums, which hold near one point only.
 //
 // Where the variances S_k of the residuals depend on the germ, as those of a filter's innovations
 // do, ½ Σ log(S_k/R_k) is added; noise is known then.
@@ -28,6 +29,7 @@
 #include <vector>
 
 #include "core/bayes/mismatch_sums.h"
+#include "core/bayes/relative_samples.h"
 #include "core/bayes/robust_samples.h"
 #include "core/common/types.h"
 
@@ -65,6 +67,9 @@ struct ChannelSums {
   double Degrees() const {
     return degrees_factor * static_cast<double>(samples.count()) + surplus - spent;
   }
+  // Returns the χ² whose −log of the likelihood is that of `chi_squared` plus ½ L, L = Σ
+  // log(R_k/R⁰_k) being `logs`. With known noise it may be below 0.
+  double WithLogVariance(double chi_squared, double logs) const;
   // Returns r at d, in [−1, 1]; 0 without samples.
   double Lag1Correlation(const ConstVectorRef& d) const;
 };
@@ -74,10 +79,12 @@ class Mismatch {
  public:
   // Takes the sums of channels with known noise.
   Mismatch(MismatchSums sums);  // NOLINT(google-explicit-constructor): the plain case
-  // `kept` has an element for each channel or none. Channels whose element handles outliers have
-  // known noise, and their likelihood is that of these samples in place of the sums.
+  // `kept` and `relative` have an element for each channel or none. The likelihood of a channel
+  // whose element keeps samples is that of these in place of the sums. Channels with outliers then
+  // have known noise, and those of relative noise no correlation.
   explicit Mismatch(const std::vector<ChannelSums>& channels,
-                    const std::vector<RobustSamples>& kept = {});
+                    const std::vector<RobustSamples>& kept = {},
+                    const std::vector<RelativeSamples>& relative = {});
 
   int terms() const;
 

@@ -110,7 +110,8 @@ void serialize(Archive& archive, ChannelSums& sums) {
 template <class Archive>
 void serialize(Archive& archive, SampleBySample& few) {
   archive(few.channels, few.own_error, few.log_noise, few.log_variance, few.check_chi_squared,
-          few.check_residual, few.point_chi_squared);
+          few.check_residual, few.point_chi_squared, few.relative, few.check_log_variance,
+          few.point_log_variance, few.largest);
 }
 
 template <class Archive>

@@ -22,7 +22,7 @@ struct EstimatorState {
 
 // Version of the format. Raise it with every change in the meaning of the bytes or in what is
 // computed from them.
-inline constexpr uint32_t kSnapshotVersion = 20;
+inline constexpr uint32_t kSnapshotVersion = 21;
 
 // Encodes the state of an estimator after `rows` rows of the problem of that fingerprint.
 std::string EncodeState(const EstimatorState& state, int64_t rows, uint32_t fingerprint);

@@ -8,6 +8,7 @@
 
 #include "core/bayes/mismatch.h"
 #include "core/bayes/outlier_density.h"
+#include "core/bayes/relative_samples.h"
 #include "core/bayes/robust_samples.h"
 #include "core/bayes/window_sums.h"
 #include "core/common/types.h"
@@ -16,16 +17,21 @@
 
 namespace polyest::internal {
 
-// While channels with outliers have few samples: these, and what AbsorbedRows has under the same
-// names, with their likelihood in place of that of weighted samples (bayes/robust_samples.h). Other
-// channels have the same in both.
+// While channels with outliers or relative noise have few samples: these, and what AbsorbedRows has
+// under the same names, with their likelihood in place of that of weighted or scored samples
+// (bayes/robust_samples.h, bayes/relative_samples.h). Other channels have the same in both.
 struct SampleBySample {
-  std::vector<RobustSamples> channels;  // per channel; those that keep none have no outliers
+  std::vector<RobustSamples> channels;    // per channel; those that keep none have no outliers
+  std::vector<RelativeSamples> relative;  // per channel
   double own_error = 0;
   double log_noise = 0, log_variance = 0;
-  Matrix check_chi_squared;  // C × m; for a channel whose samples are kept 2 Σ ρ, as below
+  Matrix check_chi_squared;  // C × m; for a channel with outliers 2 Σ ρ, as below
   Vector check_residual;
   Matrix point_chi_squared;  // Q × m
+  // Σ log(R/R⁰) at the check points (C × m) and the collocation points (Q × m); 0 for channels of
+  // other noise.
+  Matrix check_log_variance, point_log_variance;
+  Vector largest;  // per channel of relative noise: the largest |z|
 };
 
 // The accumulated contributions of the rows that an expansion has absorbed.

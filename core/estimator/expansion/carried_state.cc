@@ -109,6 +109,7 @@ class Substitution {
     few.check_chi_squared = absorbed.check_chi_squared;
     Matrix product;
     for (Eigen::Index c = 0; c < channels(); ++c) {
+      CarryRelative(c, points, few);
       RobustSamples& samples = few.channels[static_cast<size_t>(c)];
       samples = samples.Substituted(transfer_, shift_);
       if (samples.outliers() == OutlierHandling::kNone) continue;
@@ -117,6 +118,23 @@ class Substitution {
       few.point_chi_squared.col(c) = 2 * losses.head(points);
       few.check_chi_squared.col(c) = 2 * losses.tail(losses.size() - points);
     }
+  }
+
+  void CarryRelative(Eigen::Index c, Eigen::Index points, SampleBySample& few) const {
+    RelativeSamples& samples = few.relative[static_cast<size_t>(c)];
+    samples = samples.Substituted(transfer_, shift_);
+    if (c == 0) {
+      few.point_log_variance.setZero(points, channels());
+      few.check_log_variance.setZero(new_phi_.rows() - points, channels());
+    }
+    if (!samples.keeps()) return;
+    Matrix product;
+    Vector chi_squared(new_phi_.rows()), log_variance(new_phi_.rows());
+    samples.EvaluateMany(new_phi_, product, chi_squared, log_variance);
+    few.point_chi_squared.col(c) = chi_squared.head(points);
+    few.check_chi_squared.col(c) = chi_squared.tail(chi_squared.size() - points);
+    few.point_log_variance.col(c) = log_variance.head(points);
+    few.check_log_variance.col(c) = log_variance.tail(log_variance.size() - points);
   }
 
   // Replaces the terms of ½ Σ log(S/σ²) = lᵀφ by l′ = T l and returns its values at the new points.

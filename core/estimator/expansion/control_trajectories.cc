@@ -94,7 +94,8 @@ RegionalExpansion::Check RegionalExpansion::Checks() const {
   const double samples = std::max<double>(1, static_cast<double>(absorbed_.samples));
   const std::optional<SampleBySample>& few = absorbed_.few;
   const Vector& residual = few ? few->check_residual : absorbed_.check_residual;
-  return {few ? few->check_chi_squared : absorbed_.check_chi_squared,
+  return {few ? WithLogVariances(few->check_chi_squared, few->check_log_variance)
+              : absorbed_.check_chi_squared,
           (residual / samples).cwiseSqrt(), absorbed_.check_valid, absorbed_.samples};
 }
 

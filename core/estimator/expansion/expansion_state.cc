@@ -86,7 +86,10 @@ bool AreOfFew(const std::optional<SampleBySample>& state,
               const std::optional<SampleBySample>& fresh, int terms) {
   if (!state) return true;
   if (!fresh || state->channels.size() != fresh->channels.size()) return false;
+  if (state->relative.size() != fresh->relative.size()) return false;
   for (size_t c = 0; c < fresh->channels.size(); ++c) {
+    const RelativeSamples& relative = state->relative[c];
+    if (relative.keeps() != fresh->relative[c].keeps() || !relative.IsValid(terms)) return false;
     const RobustSamples& samples = state->channels[c];
     if (samples.outliers() != fresh->channels[c].outliers() || !samples.IsValid(terms))
       return false;
@@ -96,7 +99,12 @@ bool AreOfFew(const std::optional<SampleBySample>& state,
          state->check_residual.size() == fresh->check_residual.size() &&
          state->point_chi_squared.rows() == fresh->point_chi_squared.rows() &&
          state->point_chi_squared.cols() == fresh->point_chi_squared.cols() &&
-         state->own_error >= 0 && std::isfinite(state->own_error);
+         state->check_log_variance.rows() == fresh->check_log_variance.rows() &&
+         state->check_log_variance.cols() == fresh->check_log_variance.cols() &&
+         state->point_log_variance.rows() == fresh->point_log_variance.rows() &&
+         state->point_log_variance.cols() == fresh->point_log_variance.cols() &&
+         IsVector(state->largest, fresh->largest.size()) && state->own_error >= 0 &&
+         std::isfinite(state->own_error);
 }
 
 // Values accumulated at the check points may be infinite, since a trajectory may diverge.

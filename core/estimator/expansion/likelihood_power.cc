@@ -28,8 +28,9 @@ struct Points {
 Points PointsOf(const RegionalExpansion& expansion, const Cost& cost) {
   const ExpansionDesign& design = expansion.design();
   std::vector<double> least, difference, prior;
+  const Matrix chi_squared_of_points = expansion.PointChiSquared();
   for (Eigen::Index q = 0; q < design.points.rows(); ++q) {
-    const Vector chi_squared = expansion.PointChiSquared().row(q).transpose();
+    const Vector chi_squared = chi_squared_of_points.row(q).transpose();
     if (!chi_squared.allFinite()) continue;
     const Vector eta = design.points.row(q).transpose();
     const CostValue value = cost.Evaluate(eta);

@@ -49,8 +49,9 @@ Matrix BestPoints(const RegionalExpansion& expansion, const Cost& cost) {
   const Matrix& points = expansion.design().points;
   Vector least;
   cost.EvaluateMany(points, least);
+  const Matrix chi_squared_of_points = expansion.PointChiSquared();
   for (Eigen::Index q = 0; q < points.rows(); ++q) {
-    const Vector chi_squared = expansion.PointChiSquared().row(q).transpose();
+    const Vector chi_squared = chi_squared_of_points.row(q).transpose();
     const double model = chi_squared.allFinite()
                              ? ModelCost(expansion, cost, points.row(q).transpose(), chi_squared)
                              : kInfinity;

@@ -202,7 +202,7 @@ void RegionalExpansion::AbsorbSample(int row, int c) {
   AddToDensity(c, coefficients, z, sigma * sigma, own_error, variance, lack);
   Compare(column, z, noise);
   CompareControls(column, variance);
-  if (absorbed_.few) AddToFew(c, column, z, noise, lack);
+  if (absorbed_.few) AddToFew(row, c, z, noise, lack);
   if (problem_.uses_filters()) AddLogVariance(column, noise, variance);
   // χ²_q += (z − y_q)²/R
   absorbed_.point_chi_squared.col(c).array() +=
@@ -258,7 +258,7 @@ double RegionalExpansion::RoundingError() const {
 Cost RegionalExpansion::MakeCost(double regularization) const {
   const std::optional<SampleBySample>& few = absorbed_.few;
   Cost cost(design_.basis, design_.region, design_.reference,
-            few ? Mismatch(absorbed_.sums, few->channels) : Mismatch(absorbed_.sums),
+            few ? Mismatch(absorbed_.sums, few->channels, few->relative) : Mismatch(absorbed_.sums),
             problem_.prior(), regularization, WithinKnown(problem_, design_.element));
   cost.set_power(1 / noise_.misfit);
   cost.set_threads(threads_);

@@ -11,7 +11,8 @@
 // (learned_noise.h). Correlated samples are whitened first. Outliers lose weight according to their
 // residual at the posterior's centre, compared with the noise and the posterior's own spread there.
 // While they are few, the samples of channels with outliers and known noise are kept besides, and
-// their likelihood is that of each sample (bayes/robust_samples.h).
+// those of channels whose noise is relative to the prediction, and their likelihood is that of each
+// sample (bayes/robust_samples.h, bayes/relative_samples.h).
 //
 // Where the likelihood is that of prediction errors (polyest/problem.h), the variances add
 // ½ Σ log(S_k/σ_k²), discounted as their samples are by σ²/R. Outliers are handled by the filters
@@ -147,6 +148,11 @@ class RegionalExpansion {
   Vector CentreOfWeights() const;
   // Returns the samples of a channel with outliers while they are kept; null without any.
   const RobustSamples* KeptSamples(int channel) const;
+  // Returns the samples of a channel of relative noise while they are kept; null without any.
+  const RelativeSamples* KeptRelative(int channel) const;
+  // Returns χ² of a channel's samples at d = φ(η) − φ(η_0), with the noise of the predictions there
+  // while they are kept.
+  double ChiSquaredAt(int channel, const ConstVectorRef& d) const;
   // Returns the term that makes the costs of different expansions of the same record comparable,
   // each with its own noise and outlier weights: Σ ½ log R_k, and what the reweighting leaves out
   // of the likelihood. R is taken with the expansion's own error, as in the sums, or without it.
@@ -155,11 +161,9 @@ class RegionalExpansion {
     return with_own_error ? absorbed_.few->log_variance : absorbed_.few->log_noise;
   }
   // Returns χ² of the model itself at the collocation points, Q × m: what the sums say of the
-  // expansion there, or 2 Σ ρ of samples that are kept. Not finite where a trajectory could not be
-  // integrated.
-  const Matrix& PointChiSquared() const {
-    return absorbed_.few ? absorbed_.few->point_chi_squared : absorbed_.point_chi_squared;
-  }
+  // expansion there, or what has the same likelihood as samples that are kept. Not finite where a
+  // trajectory could not be integrated.
+  Matrix PointChiSquared() const;
   // Returns the cost on this expansion with α² = regularization and the likelihood to the power
   // 1/misfit.
   Cost MakeCost(double regularization) const;
@@ -209,9 +213,14 @@ class RegionalExpansion {
                     double deviation);
   void AddToDensity(int channel, const ConstVectorRef& coefficients, double z, double noise,
                     double own_error, double variance, double lack);
+
+  // Samples that are kept (few_samples.cc).
   void KeepFewSamples();
-  int64_t MaxKeptSamples() const;
-  void AddToFew(int channel, int column, double z, double noise, double lack);
+  bool IsKeptRelative(int channel) const;
+  Matrix WithLogVariances(Matrix chi_squared, const Matrix& log_variance) const;
+  void AddToFew(int row, int channel, double z, double noise, double lack);
+  void AddRelative(int row, int channel);
+  void AddRobust(int channel, int column, double z, double noise, double lack);
 
   // The sums of the samples, begun with those of ended runs (ended_runs_sums.cc).
   void BeginSums();

@@ -41,7 +41,8 @@ std::optional<Vector> VarianceFactors(const ResolvedProblem& problem,
     if (!DifferInScale(a, b)) return std::nullopt;
     factors[static_cast<Eigen::Index>(c)] = b.scale * b.scale / (a.scale * a.scale);
     if (a.scale == b.scale) continue;
-    const bool plain = b.learned && b.grid.empty() && !problem.uses_filters() &&
+    const bool plain = b.learned && !present.KeptRelative(static_cast<int>(c)) && b.grid.empty() &&
+                       !problem.uses_filters() &&
                        problem.problem().measured[c].noise.outliers == OutlierHandling::kNone;
     if (!plain) return std::nullopt;
   }

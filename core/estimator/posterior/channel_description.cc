@@ -23,14 +23,15 @@ constexpr int64_t kLeastSums = 8;         // of successive residuals
 constexpr double kAlike = 1.5;            // largest ratio of mean squares that are much the same
 constexpr double kMinMeanSquare = 1e-24;  // floor for residuals that vanish
 
-// Returns E[χ²] over the posterior; E[σ²] = E[χ²]/N for an unknown scale.
-double MeanChiSquared(const Cost& cost, const ChannelSums& sums, const PosteriorDraws& posterior) {
+// Returns E[χ²] of a channel over the posterior; E[σ²] = E[χ²]/N for an unknown scale.
+double MeanChiSquared(const Cost& cost, const RegionalExpansion& expansion, int c,
+                      const PosteriorDraws& posterior) {
   const Eigen::Index stride = std::max<Eigen::Index>(1, posterior.scores.rows() / kDrawsForNoise);
   double sum = 0, weights = 0;
   for (Eigen::Index i = 0; i < posterior.scores.rows(); i += stride) {
     const Vector xi = cost.prior().OfScores(posterior.scores.row(i).transpose());
     const double weight = posterior.weights[i];
-    sum += weight * sums.samples.ChiSquared(cost.BasisDifference(cost.region().ToLocal(xi)));
+    sum += weight * expansion.ChiSquaredAt(c, cost.BasisDifference(cost.region().ToLocal(xi)));
     weights += weight;
   }
   return sum / weights;
@@ -110,15 +111,16 @@ void DescribeChannel(const AssessmentRequest& request, const Cost& cost, const V
   // With N degrees of freedom, χ²/N has the mean 1 if the working noise has the right size.
   const double mean_square =
       sums.scale_unknown
-          ? std::max(kMinMeanSquare, MeanChiSquared(cost, sums, posterior) / sums.Degrees())
+          ? std::max(kMinMeanSquare,
+                     MeanChiSquared(cost, *request.expansion, c, posterior) / sums.Degrees())
           : 1;
   channel.noise_std_dev = std::sqrt(mean_square) * noise.scale * summary.RootMeanSquareNoise();
   const double share =
       fitted * samples / static_cast<double>(request.record->samples()) + sums.spent;
   const OutlierHandling handling =
       request.problem->problem().measured[static_cast<size_t>(c)].noise.outliers;
-  const Outliers outliers =
-      OutliersAt(*request.expansion, handling, d, c, sums.samples.ChiSquared(d) / mean_square);
+  const Outliers outliers = OutliersAt(*request.expansion, handling, d, c,
+                                       request.expansion->ChiSquaredAt(c, d) / mean_square);
   channel.chi_squared = JudgedChiSquared(request, c, outliers, share);
   channel.lag1_correlation = lag1.Of(c);
   DescribeSums(request, eta, d, c, channel);

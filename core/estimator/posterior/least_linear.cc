@@ -58,6 +58,7 @@ double LeftOfQuadratic(const Vector& values) {
 double LeftOfLines(const RegionalExpansion& lines, Eigen::Index germ) {
   std::vector<bool> kept(static_cast<size_t>(lines.points()), false);
   for (const int point : lines.kept_points()) kept[static_cast<size_t>(point)] = true;
+  const Matrix chi_squared = lines.PointChiSquared();
   double left = 0;
   for (Eigen::Index line = 0; line < kLines; ++line) {
     const Eigen::Index first = (germ * kLines + line) * kPointsOfLine;
@@ -65,8 +66,8 @@ double LeftOfLines(const RegionalExpansion& lines, Eigen::Index germ) {
                      [](bool one) { return one; })) {
       continue;
     }
-    for (Eigen::Index c = 0; c < lines.PointChiSquared().cols(); ++c) {
-      left += LeftOfQuadratic(lines.PointChiSquared().col(c).segment(first, kPointsOfLine));
+    for (Eigen::Index c = 0; c < chi_squared.cols(); ++c) {
+      left += LeftOfQuadratic(chi_squared.col(c).segment(first, kPointsOfLine));
     }
   }
   return left;

@@ -146,7 +146,8 @@ std::string ReasonNotLearned(const Findings& findings, size_t c) {
   if (channel.samples == 0) return "";
   const ChannelNoise& noise = findings.expansion->noise().channels[c];
   const double relative = noise.scale * model.relative;
-  if (relative > kLargeRelativeNoise && !noise.of_prediction) {
+  const bool kept = findings.expansion->KeptRelative(static_cast<int>(c)) != nullptr;
+  if (relative > kLargeRelativeNoise && !noise.of_prediction && !kept) {
     return absl::StrFormat(
         "its relative noise of %.3g %% is taken of the samples and not of the predictions, which "
         "makes predictions too small by about %.2g %%",

@@ -36,8 +36,11 @@ enum class OutlierHandling {
 // term's maximum. Samples of 0 before any other, to which neither `absolute` nor a full scale gives
 // a σ above 0, are not used. If the part proportional to |z| is taken of the sample, samples that
 // happen to be small count too much: an adaptive expansion takes it of the model's prediction in
-// place of z as soon as there is one, unless the noise is correlated. If the size of the noise is
-// unknown, a factor of σ is estimated; without numbers σ is then 1.
+// place of z, unless the noise is correlated. While there are few samples, it is that of the
+// prediction for each value of the parameters, with the likelihood that belongs to it; later it is
+// that of the prediction at the estimate. Where outliers are handled, it is so as soon as there is
+// an estimate. If the size of the noise is unknown, a factor of σ is estimated; without numbers σ is
+// then 1.
 struct NoiseModel {
   // None of the parts may be above 10⁵⁰, or below 10⁻⁵⁰ unless it is 0.
   double absolute = 0;         // ≥ 0, in the output's unit
