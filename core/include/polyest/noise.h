@@ -39,8 +39,8 @@ enum class OutlierHandling {
 // place of z, unless the noise is correlated. While there are few samples, it is that of the
 // prediction for each value of the parameters, with the likelihood that belongs to it; later it is
 // that of the prediction at the estimate. Where outliers are handled, it is so as soon as there is
-// an estimate. If the size of the noise is unknown, a factor of σ is estimated; without numbers σ is
-// then 1.
+// an estimate. If the size of the noise is unknown, a factor of σ is estimated; without numbers σ
+// is then 1.
 struct NoiseModel {
   // None of the parts may be above 10⁵⁰, or below 10⁻⁵⁰ unless it is 0.
   double absolute = 0;         // ≥ 0, in the output's unit
