@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "core/bayes/differential_evolution.h"
-#include "core/bayes/weighted_samples.h"
 #include "core/chaos/collocation_points.h"
 #include "core/common/check.h"
 #include "core/common/linear_algebra.h"
@@ -106,7 +105,7 @@ WeightedDraws WeighProposed(const Cost& cost, const Vector& lower, const Vector&
   draws.etas = etas.topRows(kept);
   draws.costs = costs.head(kept);
   draws.weights = weights.head(kept) / weights.head(kept).sum();
-  draws.effective_size = EffectiveSizeOfWeights(draws.weights);
+  draws.effective_size = 1 / draws.weights.squaredNorm();
   return draws;
 }
 

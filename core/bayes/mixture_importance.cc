@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "core/bayes/log_sum_exp.h"
-#include "core/bayes/weighted_samples.h"
 #include "core/chaos/collocation_points.h"
 #include "core/common/check.h"
 #include "core/common/linear_algebra.h"
@@ -67,7 +66,7 @@ void SetMoments(const Vector& mean, const Matrix& covariance, GaussianMode& mode
 
 // Moves the mode to the draws in it, whose weights (Σ = 1) are given.
 void Adapt(const Matrix& etas, const Vector& weights, GaussianMode& mode) {
-  const double draws = EffectiveSizeOfWeights(weights);
+  const double draws = 1 / weights.squaredNorm();
   const double part = draws / (draws + kPresentPerDimension * static_cast<double>(etas.cols()));
   const Vector mean = part * etas.transpose() * weights + (1 - part) * mode.centre;
   const Matrix centred = etas.rowwise() - mean.transpose();

@@ -9,8 +9,8 @@
 
 namespace polyest::internal {
 
-// Returns (Σ w)²/Σ w², the number of equally weighted draws that tell as much. The weights need not
-// be normalized.
+// Returns (Σ w)²/Σ w², the number of equally weighted draws that tell as much, for weights that
+// need not be normalized; of those that are it is 1/Σ w².
 double EffectiveSizeOfWeights(const ConstVectorRef& weights);
 
 double WeightedMean(const ConstVectorRef& draws, const ConstVectorRef& weights);

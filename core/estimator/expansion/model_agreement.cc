@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "core/bayes/cost_minima.h"
-#include "core/bayes/weighted_samples.h"
 #include "core/estimator/expansion/search_domain.h"
 
 namespace polyest::internal {
@@ -121,7 +120,7 @@ Agreement AgreementWithModel(const RegionalExpansion& expansion, const Cost& cos
       std::sqrt(weights.dot((checks.differences.array() - mean).square().matrix()));
   const ShiftOfResiduals residuals = BoundByResiduals(expansion, cost, checks);
   agreement.shift = residuals.bound;
-  if (residuals.checks_represent && EffectiveSizeOfWeights(weights) >= kMinEffectiveChecks) {
+  if (residuals.checks_represent && 1 >= kMinEffectiveChecks * weights.squaredNorm()) {
     const double carried = std::sqrt(cost.power() * expansion.CarriedError());
     agreement.shift = std::min(agreement.shift, spread + carried);
     if (spread <= kMaxSpreadOfMean) agreement.mean_difference = mean;

@@ -6,6 +6,7 @@
 #include "core/estimator/expansion/regional_expansion.h"
 
 namespace polyest::internal {
+
 // Returns the deviation of the sample in units of its possible error there, or 0 if outliers are
 // not handled. `variance` is that of the sample about the expansion.
 double RegionalExpansion::DeviationFromCentre(int channel, const ConstVectorRef& coefficients,

@@ -72,7 +72,7 @@ WeightedDraws WeightedBy(const Vector& costs, const Matrix& cover) {
   draws.etas = cover(kept, Eigen::all);
   draws.costs = costs(kept);
   draws.weights = weights(kept) / weights(kept).sum();
-  draws.effective_size = EffectiveSizeOfWeights(draws.weights);
+  draws.effective_size = 1 / draws.weights.squaredNorm();
   return draws;
 }
 

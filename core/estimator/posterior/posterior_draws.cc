@@ -195,10 +195,10 @@ std::string WhyNotMixed(const PosteriorDraws& draws) {
 }
 
 void Reweigh(const ConstVectorRef& log_factors, PosteriorDraws& draws) {
-  const double before = EffectiveSizeOfWeights(draws.weights);
+  const double before = 1 / draws.weights.squaredNorm();
   draws.weights.array() *= (log_factors.array() - log_factors.maxCoeff()).exp();
   draws.weights /= draws.weights.sum();
-  draws.effective_size *= std::min(1.0, EffectiveSizeOfWeights(draws.weights) / before);
+  draws.effective_size *= std::min(1.0, 1 / draws.weights.squaredNorm() / before);
 }
 
 void Widen(const Vector& factors, const Prior& prior, PosteriorDraws& draws) {

@@ -91,7 +91,7 @@ void ExpectExact(Output output, double r, bool unknown, const std::vector<double
 TEST(LargeRelativeNoise, LeavesThePosteriorOfAConstantExact) {
   for (const double r : {0.3, 0.5}) {
     for (uint64_t seed = 1; seed <= 3; ++seed) {
-      SCOPED_TRACE(testing::Message() << r << " seed " << seed);
+      SCOPED_TRACE(::testing::Message() << r << " seed " << seed);
       ExpectExact(Output::kConstant, r, false, Noisy(Output::kConstant, r, 25, seed));
     }
   }
@@ -101,7 +101,7 @@ TEST(LargeRelativeNoise, LeavesThePosteriorOfAConstantExact) {
 TEST(LargeRelativeNoise, TellsOfPredictionsThoughItsSizeIsUnknown) {
   for (const double r : {0.3, 0.5}) {
     for (uint64_t seed = 1; seed <= 3; ++seed) {
-      SCOPED_TRACE(testing::Message() << r << " seed " << seed);
+      SCOPED_TRACE(::testing::Message() << r << " seed " << seed);
       ExpectExact(Output::kLine, r, true, Noisy(Output::kLine, r, 25, seed));
     }
   }
