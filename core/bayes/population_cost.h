@@ -55,10 +55,10 @@ class PopulationCost {
     Vector gradient;  // n
     Matrix hessian;   // n × n
   };
-  // The standard deviation of a run's posterior in units of s up to which it counts as a Gaussian,
-  // whatever its shape: of −log ∫ p(g) N(g; μ, s²)/N(g; 0, 1) dg that leaves out the term of the
-  // third cumulant, γ (S^½/s)³ (u³ − 3u)/6 with the skewness γ at u = (c − μ)/s, below 10⁻⁴ for u
-  // < 3.
+  // A run counts as a Gaussian, whatever its shape, if the standard deviation √S of its posterior
+  // is below this part of s. That leaves out the third cumulant's term of −log ∫ p(g) N(g; μ,
+  // s²)/N(g; 0, 1) dg, γ (√S/s)³ (u³ − 3u)/6 with the skewness γ and u = (c − μ)/s. It is below
+  // 10⁻⁴ for |u| < 3 and |γ| < 1.
   static constexpr double kNarrow = 0.03;
   // The median of s and the standard deviation of its logarithm in its prior: 95 % of it lies
   // within a factor of 7 of the median. The stated prior has to cover where the population is and

@@ -162,13 +162,13 @@ absl::StatusOr<int64_t> MixtureComponent::EliminateAll(const Matrix& particles, 
 absl::Status MixtureComponent::BeginAwaitedRun(const Stop& stop) {
   POLYEST_RETURN_IF_ERROR(BeginRunAlone(*awaited_run_, stop));
   awaited_run_.reset();
-  awaiting_.reset();
+  particles_for_run_.reset();
   return absl::OkStatus();
 }
 
 absl::Status MixtureComponent::BeginRunAlone(int run, const Stop& stop) {
   POLYEST_ASSIGN_OR_RETURN(ResolvedProblem next, problem_.OfRun(run));
-  std::optional<Matrix> particles = awaiting_;
+  std::optional<Matrix> particles = particles_for_run_;
   std::optional<GermSummary> posterior;
   if (!particles) {
     posterior = GaussianPosterior(stop);

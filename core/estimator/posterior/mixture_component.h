@@ -80,7 +80,7 @@ class MixtureComponent {
   bool awaits_run() const { return awaited_run_.has_value(); }
   // Lets that run begin with the posterior of several components, of which these are particles (W ×
   // n, germ coordinates).
-  void GoOnFor(Matrix particles) { awaiting_ = std::move(particles); }
+  void GoOnFor(Matrix particles) { particles_for_run_ = std::move(particles); }
   // Begins that run. Returns InfeasibleError when a run that has ended cannot be expanded. After a
   // stop the call may be repeated.
   absl::Status BeginAwaitedRun(const Stop& stop);
@@ -210,8 +210,8 @@ class MixtureComponent {
   bool last_row_too_coarse_ = false;  // whether the last row was too coarse and not dealt with yet
   bool halves_ = false;               // whether to divide into the halves of a bisection
   bool bisected_ = false;             // whether it came from a bisection; its order stays low
-  std::optional<int> awaited_run_;    // which begins with the next row
-  std::optional<Matrix> awaiting_;    // particles of the posterior with which it begins, if not own
+  std::optional<int> awaited_run_;    // the run that begins with the next row
+  std::optional<Matrix> particles_for_run_;  // those that GoOnFor was given
   int room_ = 1;
   double weight_ = 1;
   int64_t taken_ = 0;
