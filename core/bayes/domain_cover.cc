@@ -4,13 +4,13 @@
 #include <cmath>
 
 #include "core/chaos/collocation_points.h"
+#include "core/chaos/normal.h"
 
 namespace polyest::internal {
 namespace {
 
 constexpr double kJustInDomain = 1 - 1e-12;  // keeps rounding from putting a point outside Ω
 constexpr double kOffBounds = 0.01;          // of Ω's width, for a point moved into Ω
-constexpr double kGoldenRatio = 0.6180339887498949;
 
 bool IsDiagonal(const Matrix& matrix) {
   return (matrix - Matrix(matrix.diagonal().asDiagonal())).isZero(0);
@@ -83,7 +83,7 @@ Matrix CoverOfDomain(const Region& region, const Prior& prior, const Vector& low
     if (prior.Contains(xis.col(i))) continue;
     const Vector xi = xis.col(i);
     // With s = U^{1/n}, evenly distributed U, the points on a ray are as dense as in the volume.
-    uniform = std::fmod(uniform + kGoldenRatio, 1);
+    uniform = std::fmod(uniform + kGoldenFraction, 1);
     const double fraction =
         kJustInDomain * FractionInDomain(prior, xi, inside) * std::pow(uniform, 1.0 / n);
     cover.row(i) = local.transpose() + fraction * (cover.row(i) - local.transpose());

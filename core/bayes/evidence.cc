@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <numeric>
 #include <random>
 #include <utility>
@@ -11,6 +10,7 @@
 
 #include "core/bayes/weighted_samples.h"
 #include "core/chaos/collocation_points.h"
+#include "core/chaos/normal.h"
 #include "core/common/linear_algebra.h"
 
 namespace polyest::internal {
@@ -30,8 +30,7 @@ struct Gaussian {
     const auto n = static_cast<double>(mean.size());
     const Matrix scaled =
         SolveLower(factor, Matrix((points.rowwise() - mean.transpose()).transpose()));
-    const double constant =
-        -0.5 * n * std::log(2 * std::numbers::pi) - factor.diagonal().array().log().sum();
+    const double constant = -0.5 * n * kLogTwoPi - factor.diagonal().array().log().sum();
     return constant - 0.5 * scaled.colwise().squaredNorm().transpose().array();
   }
 

@@ -6,12 +6,12 @@
 
 #include "core/bayes/log_sum_exp.h"
 #include "core/bayes/noise.h"
+#include "core/chaos/normal.h"
 #include "core/common/check.h"
 
 namespace polyest::internal {
 namespace {
 
-constexpr double kHalfLogTwoPi = 0.9189385332046727;
 // Nodes of x = log of the factor of the working noise. The polynomial through six of them is good
 // to 10⁻⁷ of a sample's loss.
 constexpr int kSizes = 31;
@@ -90,7 +90,7 @@ void OutlierDensity::Add(double u, double precision, double excess) {
 }
 
 double OutlierDensity::NormalizationOfAll() const {
-  return static_cast<double>(count_) * (kHalfLogTwoPi + LackOfDensity(outliers_));
+  return static_cast<double>(count_) * (0.5 * kLogTwoPi + LackOfDensity(outliers_));
 }
 
 OutlierDensity::Value OutlierDensity::OfKnownSize() const {

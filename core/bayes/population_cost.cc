@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <utility>
 
+#include "core/chaos/normal.h"
 #include "core/common/check.h"
 
 namespace polyest::internal {
@@ -106,8 +106,6 @@ RunTerm MixtureTerm(double mean, const ScoreMixture& shape, const RunScore& popu
   return result;
 }
 
-double StandardNormalCdf(double z) { return 0.5 * std::erfc(-z / std::numbers::sqrt2); }
-
 }  // namespace
 
 RunScore InPopulation(const RunScore& alone, const RunScore& population) {
@@ -141,7 +139,7 @@ double QuantileInPopulation(const RunScore& alone, const ScoreMixture& shape,
     const double middle = 0.5 * (lower + upper);
     double below = 0;
     for (Eigen::Index k = 0; k < centres.size(); ++k) {
-      below += shares[k] * StandardNormalCdf((middle - centres[k]) / deviation);
+      below += shares[k] * NormalCdf((middle - centres[k]) / deviation);
     }
     (below < probability ? lower : upper) = middle;
   }

@@ -8,6 +8,7 @@
 #include "core/bayes/log_sum_exp.h"
 #include "core/chaos/beta_gamma.h"
 #include "core/chaos/germ.h"
+#include "core/chaos/normal.h"
 
 namespace polyest::internal {
 namespace {
@@ -26,13 +27,13 @@ double Kernel(NoiseKernel kernel, double u) {
 
 double LogKernel(NoiseKernel kernel, double u) {
   if (kernel == NoiseKernel::kNormal) {
-    return -0.5 * u * u - 0.5 * std::log(2 * std::numbers::pi);
+    return -0.5 * u * u - 0.5 * kLogTwoPi;
   }
   return std::log(0.375) - 2.5 * std::log1p(0.25 * u * u);
 }
 
 double CumulativeKernel(NoiseKernel kernel, double u) {
-  if (kernel == NoiseKernel::kNormal) return 0.5 * std::erfc(-u / std::numbers::sqrt2);
+  if (kernel == NoiseKernel::kNormal) return NormalCdf(u);
   const double w = u / std::sqrt(4 + u * u);
   return 0.5 + 0.75 * (w - w * w * w / 3);
 }

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "core/bayes/regularization_prior.h"
+#include "core/chaos/normal.h"
 #include "core/common/check.h"
 #include "core/common/linear_algebra.h"
 
@@ -59,8 +60,7 @@ double LogVolume(const Cost& cost, const Vector& deviation, const Vector& curvat
     const Germ& germ = cost.prior().germs()[static_cast<size_t>(i)];
     const double log_z = fitted[i] * LogNormalization(germ, cost.regularization()) +
                          (1 - fitted[i]) * LogLaplaceNormalization(germ, cost.regularization());
-    sum += 0.5 * (std::log(2 * std::numbers::pi) - std::log(curvature[i])) +
-           std::log(deviation[i]) - log_z;
+    sum += 0.5 * (kLogTwoPi - std::log(curvature[i])) + std::log(deviation[i]) - log_z;
   }
   return sum;
 }

@@ -6,13 +6,12 @@
 
 #include "core/chaos/beta_gamma.h"
 #include "core/chaos/exponential.h"
+#include "core/chaos/normal.h"
 #include "core/chaos/truncated_normal.h"
 #include "core/common/check.h"
 
 namespace polyest::internal {
 namespace {
-
-const double kLogTwoPi = std::log(2 * std::numbers::pi);
 
 // The distance beyond which Mills' ratio gives the probability, which may underflow.
 constexpr double kTail = 30;

@@ -5,6 +5,7 @@
 #include <numbers>
 #include <utility>
 
+#include "core/chaos/normal.h"
 #include "core/common/check.h"
 
 namespace polyest::internal {
@@ -100,7 +101,7 @@ double ScoreLikelihood::NegativeLogEvidence(const RunScore& population) const {
     const double u = (g - population.mean) / deviation;
     values[i] = LogAt(g) - 0.5 * u * u;
   }
-  return std::log(deviation) + 0.5 * std::log(2 * std::numbers::pi) - LogTrapezoid(values, step);
+  return std::log(deviation) + 0.5 * kLogTwoPi - LogTrapezoid(values, step);
 }
 
 bool ScoreLikelihood::IsGaussian() const {

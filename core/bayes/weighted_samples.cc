@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/chaos/normal.h"
 #include "core/common/check.h"
 
 namespace polyest::internal {
@@ -169,9 +170,8 @@ std::vector<Eigen::Index> EquallyWeighted(const ConstVectorRef& weights, int cou
 }
 
 std::vector<Eigen::Index> StratifiedDraws(const ConstVectorRef& weights, int count) {
-  constexpr double kGolden = 0.6180339887498949;  // (√5 − 1)/2
   return RowsAt(weights, count, [](int i) {
-    const double place = 0.5 + i * kGolden;
+    const double place = 0.5 + i * kGoldenFraction;
     return place - std::floor(place);
   });
 }

@@ -7,6 +7,7 @@
 
 #include "core/chaos/beta_gamma.h"
 #include "core/chaos/exponential.h"
+#include "core/chaos/normal.h"
 #include "core/chaos/truncated_normal.h"
 #include "core/common/check.h"
 
@@ -16,7 +17,7 @@ Germ::Germ(GermFamily family, double first_shape, double second_shape)
     : family_(family), first_shape_(first_shape), second_shape_(second_shape) {
   switch (family_) {
     case GermFamily::kNormal:  // 1/√(2π)
-      log_normalization_ = -0.5 * std::log(2 * std::numbers::pi);
+      log_normalization_ = -0.5 * kLogTwoPi;
       break;
     case GermFamily::kUniform:  // 1/2
       log_normalization_ = -std::numbers::ln2;
@@ -30,7 +31,7 @@ Germ::Germ(GermFamily family, double first_shape, double second_shape)
       break;
     case GermFamily::kTruncatedNormal:  // 1/(√(2π) ∫_a^b φ)
       probability_ = NormalProbability(first_shape_, second_shape_);
-      log_normalization_ = -0.5 * std::log(2 * std::numbers::pi) - std::log(probability_);
+      log_normalization_ = -0.5 * kLogTwoPi - std::log(probability_);
       TakeMoments();
       break;
     case GermFamily::kExponential:
@@ -213,8 +214,8 @@ double Germ::LogDensitySecondDerivative(double xi) const {
 
 double Germ::CumulativeProbability(double xi) const {
   switch (family_) {
-    case GermFamily::kNormal:  // the complementary error function keeps the lower tail
-      return 0.5 * std::erfc(-xi / std::numbers::sqrt2);
+    case GermFamily::kNormal:
+      return NormalCdf(xi);
     case GermFamily::kUniform:
       return std::clamp(0.5 * (1 + xi), 0.0, 1.0);
     case GermFamily::kBeta:
@@ -232,7 +233,7 @@ double Germ::CumulativeProbability(double xi) const {
 double Germ::UpperProbability(double xi) const {
   switch (family_) {
     case GermFamily::kNormal:
-      return 0.5 * std::erfc(xi / std::numbers::sqrt2);
+      return NormalCdf(-xi);
     case GermFamily::kUniform:
       return std::clamp(0.5 * (1 - xi), 0.0, 1.0);
     case GermFamily::kBeta:  // the mirrored density
@@ -291,7 +292,7 @@ double Germ::Quantile(double probability) const {
 
 double Germ::OfNormalScore(double score) const {
   if (family_ == GermFamily::kNormal || std::isnan(score)) return score;
-  const double tail = 0.5 * std::erfc(std::min(std::abs(score), kMaxScore) / std::numbers::sqrt2);
+  const double tail = NormalCdf(-std::min(std::abs(score), kMaxScore));
   return score <= 0 ? LowerQuantile(tail) : UpperQuantile(tail);
 }
 

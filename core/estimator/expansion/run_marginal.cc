@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <utility>
 
 #include "core/chaos/gauss_rule.h"
+#include "core/chaos/normal.h"
 #include "core/common/linear_algebra.h"
 
 namespace polyest::internal {
@@ -82,7 +82,7 @@ double RunMarginal::NegativeLogIntegral(const Vector& origin,
   if (own == 1) return IntegrateLine(origin, minimum);
   if (own <= kMaxInBox) return IntegrateBox(origin, minimum);
   return minimum.value + CholeskyFactor(minimum.hessian).HalfLogDeterminant() -
-         0.5 * static_cast<double>(own) * std::log(2 * std::numbers::pi);
+         0.5 * static_cast<double>(own) * kLogTwoPi;
 }
 
 double RunMarginal::IntegrateLine(const Vector& origin, const ConditionalMinimum& minimum) const {
@@ -131,7 +131,7 @@ double RunMarginal::IntegrateBox(const Vector& origin, const ConditionalMinimum&
   cost_.EvaluateMany(etas, costs);
   costs -= 0.5 * deviates.rowwise().squaredNorm();
   return NegativeLogSum(costs, weights) + factor.HalfLogDeterminant() -
-         0.5 * static_cast<double>(own) * std::log(2 * std::numbers::pi);
+         0.5 * static_cast<double>(own) * kLogTwoPi;
 }
 
 }  // namespace polyest::internal

@@ -6,6 +6,7 @@
 
 #include "core/chaos/gauss_rule.h"
 #include "core/chaos/germ.h"
+#include "core/chaos/normal.h"
 
 namespace polyest::internal {
 namespace {
@@ -44,7 +45,7 @@ struct Mixture {
         continue;
       }
       const double score = distance / deviation[i];
-      below.probability += weights[i] * 0.5 * std::erfc(-score / std::numbers::sqrt2);
+      below.probability += weights[i] * NormalCdf(score);
       below.density += weights[i] * std::exp(-0.5 * score * score) / deviation[i];
     }
     below.density *= 0.5 * std::numbers::inv_sqrtpi * std::numbers::sqrt2;

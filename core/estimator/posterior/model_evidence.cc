@@ -6,29 +6,26 @@
 
 #include "core/bayes/log_sum_exp.h"
 #include "core/bayes/weighted_samples.h"
+#include "core/chaos/beta_gamma.h"
+#include "core/chaos/normal.h"
 #include "core/common/linear_algebra.h"
 #include "core/estimator/posterior/mixture_share.h"
 
 namespace polyest::internal {
 namespace {
 
-constexpr double kLog2Pi = 1.8378770664093453;
-
 // Returns log ½ Γ(½ degrees), which is log ∫ s^−degrees e^(−χ²/2s²) ds/s + ½ degrees log(χ²/2).
-double LogOfScaleIntegral(double degrees) {
-  int sign = 0;  // lgamma would write a global one, a race between threads
-  return ::lgamma_r(0.5 * degrees, &sign) - std::numbers::ln2;
-}
+double LogOfScaleIntegral(double degrees) { return LogGamma(0.5 * degrees) - std::numbers::ln2; }
 
 // Returns what −J_mismatch of the channel lacks to be the log of the likelihood, but for log σ of
 // the working noise.
 double LogConstant(const ChannelSums& sums) {
   const double n = sums.Degrees();
-  const double gaussian = -0.5 * static_cast<double>(sums.samples.count()) * kLog2Pi;
+  const double gaussian = -0.5 * static_cast<double>(sums.samples.count()) * kLogTwoPi;
   if (n <= 1) return gaussian;
   // J leaves out ½ N log ½ − ½ N (1 − log N) of the integral over the scale, see mismatch.h.
   const double scale = 0.5 * n * (1 - std::log(0.5 * n));
-  const double correlation = 0.5 * kLog2Pi - std::numbers::ln2;  // with the density ½
+  const double correlation = 0.5 * kLogTwoPi - std::numbers::ln2;  // with the density ½
   if (sums.scale_unknown && sums.correlation_unknown) {
     return gaussian + scale - 0.5 * std::numbers::ln2 + LogOfScaleIntegral(n - 1) + correlation;
   }
@@ -46,7 +43,7 @@ double LogOfCorrelation(const ChannelSums& sums, const Vector& d) {
   const auto cost = [&](bool unknown) {
     return NegativeLogLikelihood(n, chi_squared, differences, sums.scale_unknown, unknown);
   };
-  return cost(false) - cost(true) + 0.5 * kLog2Pi - std::numbers::ln2 - 0.5 * std::log(n);
+  return cost(false) - cost(true) + 0.5 * kLogTwoPi - std::numbers::ln2 - 0.5 * std::log(n);
 }
 
 // Puts the density of samples with outliers in place of what the weighted sums make of it. About
@@ -144,7 +141,7 @@ double LaplaceIntegral(const RegionalExpansion& expansion, Cost cost, const Cons
   cost.set_power(1);
   const CholeskyFactor factor(cost.Hessian(eta));
   if (!factor.positive_definite()) return -kInfinity;
-  return -cost.Evaluate(eta).total + 0.5 * cost.dimension() * kLog2Pi -
+  return -cost.Evaluate(eta).total + 0.5 * cost.dimension() * kLogTwoPi -
          factor.HalfLogDeterminant() + expansion.design().region.LogVolume();
 }
 

@@ -9,6 +9,7 @@
 
 #include "core/bayes/population_cost.h"
 #include "core/chaos/collocation_points.h"
+#include "core/chaos/normal.h"
 #include "core/common/check.h"
 #include "core/estimator/problem/populations.h"
 #include "core/estimator/problem/resolved_problem.h"
@@ -107,7 +108,6 @@ void MoveIntoPopulation(const ResolvedProblem::Population& among, const Vector& 
 // run's: their path (ended_runs.h) and quasi-random normal deviates from it.
 Matrix ResolvedProblem::ThetasOfEndedRun(const ConstMatrixRef& thetas, int run) const {
   POLYEST_CHECK(ended_runs_ != nullptr);
-  constexpr double kGoldenRatio = 0.6180339887498949;
   const std::vector<int>& runs = ended_runs_->run;
   const auto found = std::ranges::lower_bound(runs, run);
   if (found == runs.end() || *found != run) return thetas;  // a run without rows: nothing is known
@@ -121,7 +121,7 @@ Matrix ResolvedProblem::ThetasOfEndedRun(const ConstMatrixRef& thetas, int run) 
   for (Eigen::Index i = 0; i < thetas.rows(); ++i) {
     Vector xi = prior_.ToGerm(thetas.row(i).transpose());
     const Vector deviate = cube.row(i).transpose().unaryExpr([&](double u) {
-      const double turned = u + kGoldenRatio * run;
+      const double turned = u + kGoldenFraction * run;
       return Germ::Normal().Quantile(std::clamp(turned - std::floor(turned), 1e-9, 1 - 1e-9));
     });
     const Vector centre = path.centre + path.slope * (xi(shared) - ended_runs_->region.centre());
