@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "core/bayes/cost_minima.h"
-#include "core/bayes/curvature.h"
 #include "core/bayes/identifiability.h"
 #include "core/bayes/regularization_bias.h"
 #include "core/bayes/weighted_samples.h"
@@ -23,6 +22,7 @@
 #include "core/estimator/posterior/noise_learning.h"
 #include "core/estimator/posterior/noise_marginal.h"
 #include "core/estimator/posterior/other_minima.h"
+#include "core/estimator/posterior/parameter_spread.h"
 #include "core/estimator/posterior/population_shift.h"
 #include "core/estimator/posterior/prior_conflict.h"
 #include "core/estimator/posterior/regularization_choice.h"
@@ -201,10 +201,9 @@ class Assessment {
   }
 
   void DescribeParameters(const Cost& cost, const Vector& eta) {
-    const Vector widening =
-        shift_widening_ * noise_widening_.cwiseProduct(findings_.windows.widening);
-    Vector informed = widening.cwiseProduct(ContractionByData()).cwiseMin(1);
-    DescribeSpread(cost, eta, widening, informed);
+    const ParameterSpread spread = FindSpread(cost, eta);
+    findings_.drawn_to_curvature = spread.drawn_to_curvature;
+    estimate_.covariance = spread.covariance;
     estimate_.directions = Directions(information_, prior_);
     const Vector map = prior_.ToParameters(findings_.map_xi);
     const Vector prior_mean = prior_.Mean();
@@ -214,12 +213,12 @@ class Assessment {
       parameter.name = prior_.parameters()[static_cast<size_t>(i)].name;
       parameter.unit = problem_.units()[static_cast<size_t>(i)];
       parameter.map = map[i];
-      parameter.std_dev = deviation_[i];
-      parameter.robust_std_dev = robust_deviation_[i];
+      parameter.std_dev = spread.deviation[i];
+      parameter.robust_std_dev = spread.robust_deviation[i];
       parameter.prior_mean = prior_mean[i];
       parameter.prior_std_dev = prior_deviation[i];
-      parameter.contraction = deviation_[i] / prior_deviation[i];
-      parameter.verdict = VerdictOfContraction(informed[i]);
+      parameter.contraction = spread.deviation[i] / prior_deviation[i];
+      parameter.verdict = VerdictOfContraction(spread.informed[i]);
       if (parameter.verdict == Verdict::kIdentified && findings_.IsDoubtful(i)) {
         parameter.verdict = Verdict::kWeak;
       }
@@ -239,27 +238,22 @@ class Assessment {
            findings_.other_minima.empty();
   }
 
-  // Replaces standard deviations and contractions that contradict the draws. The cost may be flat
-  // at its minimum, where the data tell a limit and no more, or so uneven that the curvature there
-  // means nothing. Without curvature a parameter is not called identified.
-  void GoByDraws(Vector& informed) {
-    findings_.drawn_to_curvature = Vector::Zero(prior_.dimension());
-    const Vector prior_deviation = prior_.StandardDeviation();
-    for (int i = 0; i < prior_.dimension(); ++i) {
-      const double drawn =
-          std::min(WeightedStandardDeviation(posterior_.Parameter(prior_, i), posterior_.weights),
-                   prior_deviation[i]);
-      const double ratio = drawn / deviation_[i];
-      if (ratio < kContradiction && ratio > 1 / kContradiction) continue;
-      const double contraction =
-          std::min(1.0, WeightedStandardDeviation(posterior_.scores.col(i), posterior_.weights) /
-                            prior_.GermStandardDeviation()[i]);
-      const bool flat = VerdictOfContraction(informed[i]) == Verdict::kNotIdentified;
-      const double least = flat ? std::nextafter(kIdentifiedContraction, 1) : 0;
-      informed[i] = std::max(contraction, least);
-      findings_.drawn_to_curvature[i] = ratio;
-      deviation_[i] = drawn;
+  // Sets the standard deviations, and widens the draws where residuals or windows ask for it.
+  ParameterSpread FindSpread(const Cost& cost, const Vector& eta) {
+    const Vector& widening = findings_.windows.widening;
+    ParameterSpread spread =
+        SpreadOfParameters({.xi = findings_.map_xi,
+                            .hessian = design_.region.HessianToGerm(cost.Hessian(eta, spent_)),
+                            .information = information_},
+                           prior_,
+                           {.shift = shift_widening_,
+                            .all = shift_widening_ * noise_widening_.cwiseProduct(widening),
+                            .robust_ratio = findings_.windows.robust.ratio},
+                           DrawsAreRight() ? &posterior_ : nullptr);
+    if (findings_.windows.contradicted) {
+      WidenContradicted(widening, shift_widening_ * spread.contraction, prior_, posterior_);
     }
+    return spread;
   }
 
   void WidenForShift() {
@@ -307,64 +301,6 @@ class Assessment {
         FindTradeOffs(thetas, posterior_.weights, names, problem_.units(), verdicts);
   }
 
-  // Fills in the covariance and the standard deviations, never above the prior's. A standard
-  // deviation is scaled by the slope of the parameter's map at the estimate. A parameter with a
-  // curved map that the data do not identify is given the prior's own standard deviation instead,
-  // wherever the estimate lies. `informed` is what the verdicts go by.
-  void DescribeSpread(const Cost& cost, const Vector& eta, const Vector& widening,
-                      Vector& informed) {
-    const Curvature curvature = CovarianceFromCurvature(
-        design_.region.HessianToGerm(cost.Hessian(eta, spent_)), prior_, findings_.map_xi);
-    const Vector prior_deviation = prior_.StandardDeviation();
-    deviation_ = widening.cwiseProduct(curvature.standard_deviation).cwiseMin(prior_deviation);
-    if (DrawsAreRight()) GoByDraws(informed);
-    for (int i = 0; i < prior_.dimension(); ++i) {
-      const bool identified = VerdictOfContraction(informed[i]) != Verdict::kNotIdentified;
-      if (prior_.IsCurved(i) && !identified) deviation_[i] = prior_deviation[i];
-    }
-    const Vector factor = deviation_.cwiseQuotient(curvature.standard_deviation);
-    estimate_.covariance = factor.asDiagonal() * curvature.covariance * factor.asDiagonal();
-    const Vector& robust = findings_.windows.robust.ratio;
-    robust_deviation_ = Vector::Zero(prior_.dimension());
-    if (robust.size() > 0) {
-      robust_deviation_ = (shift_widening_ * robust.cwiseProduct(curvature.standard_deviation))
-                              .cwiseMin(prior_deviation);
-    }
-    if (findings_.windows.contradicted) WidenContradicted(curvature.contraction);
-  }
-
-  // Widens the draws where residuals or windows ask for it. The interval is then also at least as
-  // wide as the curvature's Gaussian, with standard deviations `contraction` relative
-  // to the prior's: of two contradicting spreads the wider one counts.
-  void WidenContradicted(const Vector& contraction) {
-    Vector factors = findings_.windows.widening;
-    for (int i = 0; i < prior_.dimension(); ++i) {
-      const double present =
-          WeightedStandardDeviation(posterior_.scores.col(i), posterior_.weights);
-      if (!(present > 0) || !(factors[i] > 1)) continue;
-      const double most = prior_.GermStandardDeviation()[i] / present;
-      const double curved = shift_widening_ * contraction[i] * most;
-      factors[i] = std::min(factors[i] * std::max(1.0, curved), std::max(1.0, most));
-    }
-    Widen(factors, prior_, posterior_);
-  }
-
-  // Returns the ratio of posterior to prior standard deviation of the scores that is due to the
-  // data. It is the larger of two values. The first comes from the curvature with the prior at its
-  // own weight, whatever α² is: a heavy prior narrows the posterior, but that is not information.
-  // The second comes from
-  //   (H_mismatch + Σ_prior⁻¹)⁻¹,
-  // in which the sharp mode of a skewed prior does not count as information either.
-  Vector ContractionByData() const {
-    const Vector& xi = findings_.map_xi;
-    Matrix curved = information_;
-    curved.diagonal() += prior_.Curvature(xi);
-    Matrix spread = information_;
-    spread.diagonal() += prior_.GermStandardDeviation().cwiseAbs2().cwiseInverse();
-    return CovarianceFromCurvature(curved, prior_, xi)
-        .contraction.cwiseMax(CovarianceFromCurvature(spread, prior_, xi).contraction);
-  }
-
   const ResolvedProblem& problem_;
   const Prior& prior_;
   const AssessmentRequest& request_;
@@ -377,8 +313,6 @@ class Assessment {
   FilteredDraws filtered_;     // at these draws
   double shift_widening_ = 1;  // factor of the uncertainty for the expansion's own error
   Vector noise_widening_;      // factors of it for the noise's correlation, by parameter
-  Vector deviation_;           // standard deviations of the parameters
-  Vector robust_deviation_;    // as deviation_, from the scores of windows; 0 if unknown
   Findings findings_;
   Estimate estimate_;
 };

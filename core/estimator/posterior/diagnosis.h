@@ -21,8 +21,6 @@ namespace polyest::internal {
 // An expansion is called inaccurate when a posterior mean may be wrong by this many of its standard
 // deviations.
 inline constexpr double kInaccurateShift = 0.25;
-// Ratio of the draws' and the curvature's standard deviations from which on they contradict.
-inline constexpr double kContradiction = 2;
 // Power of the likelihood below which the posterior shows where the expansion was made and not what
 // the data say.
 inline constexpr double kLeastUsed = 0.01;

@@ -12,6 +12,7 @@
 #include "core/estimator/posterior/marginal_description.h"
 #include "core/estimator/posterior/mixture_weighing.h"
 #include "core/estimator/posterior/model_evidence.h"
+#include "core/estimator/posterior/parameter_spread.h"
 
 namespace polyest::internal {
 namespace {
@@ -92,7 +93,7 @@ void DescribeWhole(const Prior& prior, const PosteriorDraws& posterior, const Fi
 // The curvature at the minimum is that of one component. Where it contradicts the draws of several
 // that are one piece of the posterior, the draws count. Where something speaks against them, the
 // wider of both counts.
-void GoByDraws(Findings& findings, Estimate& estimate) {
+void ReplaceByMixtureDraws(Findings& findings, Estimate& estimate) {
   const bool doubtful = findings.power < 1 || findings.shift > kInaccurateShift ||
                         findings.windows.contradicted || estimate.regularization != 1;
   findings.drawn_to_curvature = Vector::Zero(std::ssize(estimate.parameters));
@@ -100,8 +101,7 @@ void GoByDraws(Findings& findings, Estimate& estimate) {
     const ParameterEstimate& parameter = estimate.parameters[static_cast<size_t>(i)];
     const double drawn = std::min(parameter.posterior_std_dev, parameter.prior_std_dev);
     const double ratio = drawn / parameter.std_dev;
-    const bool contradicts = ratio >= kContradiction || ratio <= 1 / kContradiction;
-    if (doubtful ? ratio <= 1 : !contradicts) continue;
+    if (doubtful ? ratio <= 1 : !Contradicts(ratio)) continue;
     findings.drawn_to_curvature[i] = ratio;
     ReplaceDeviation(static_cast<int>(i), drawn, estimate);
   }
@@ -207,7 +207,7 @@ Assessed Combine(const std::vector<Assessed>& components, const std::vector<doub
   whole.findings.conflict =
       FindPriorConflict(problem, whole.posterior, whole.estimate.regularization);
   DescribeWhole(problem.prior(), whole.posterior, whole.findings, whole.estimate);
-  if (pieces.size() == 1) GoByDraws(whole.findings, whole.estimate);
+  if (pieces.size() == 1) ReplaceByMixtureDraws(whole.findings, whole.estimate);
   whole.filtered = MixFiltered(components);
   whole.estimate.filtered = DescribeFiltered(problem, whole.filtered, whole.posterior.weights);
   return whole;
