@@ -195,7 +195,7 @@ void load(Archive& archive, EndedRuns& ended) {
 }
 
 template <class Archive>
-void serialize(Archive& archive, SettlementMemory& memory) {
+void serialize(Archive& archive, ReexpansionMemory& memory) {
   OrderInVain& tried = memory.order;
   archive(memory.costs, tried.order, tried.error, tried.centre, tried.axes, tried.rows,
           tried.noise_variance, memory.prior.stays_from, memory.prior.tried);
@@ -207,7 +207,7 @@ void serialize(Archive& archive, ComponentState& component) {
   archive(component.runs, component.ended_runs, component.relative_tolerance, component.expansion,
           component.particles, component.memory, component.weight, component.room);
   Flag(archive, component.bisected);
-  archive(component.taken, component.schedule, component.settlements, component.reexpansions,
+  archive(component.taken, component.schedule, component.reexpansions_tried, component.reexpansions,
           component.abandoned_rows, component.summary, component.allowance.used,
           component.allowance.used_at, component.allowance.exempt_at, component.postponed.expansion,
           component.postponed.noise, component.postponed.tolerance);

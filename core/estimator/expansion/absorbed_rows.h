@@ -34,11 +34,35 @@ struct SampleBySample {
   Vector largest;  // per channel of relative noise: the largest |z|
 };
 
+// What the sums are of: S terms, m channels, and Q collocation, C check and K control points.
+struct AbsorbedSizes {
+  int terms = 0, channels = 0;
+  int points = 0, check_points = 0, controls = 0;
+};
+
 // The accumulated contributions of the rows that an expansion has absorbed.
 struct AbsorbedRows {
-  // Starts from zero, for S terms, m channels, and Q collocation, C check and K control points.
-  AbsorbedRows(int terms, int channels, Eigen::Index points, Eigen::Index check_points,
-               int controls);
+  // Starts from zero.
+  explicit AbsorbedRows(const AbsorbedSizes& sizes = {});
+
+  // Returns the sum of the squares of the expansion's own error in units of the noise, Σ ρ_k/R_k.
+  double OwnError() const { return few ? few->own_error : own_error; }
+  // Returns the term that makes the costs of different expansions of the same record comparable,
+  // each with its own noise and outlier weights: Σ ½ log R_k, and what the reweighting leaves out
+  // of the likelihood. R is taken with the expansion's own error, as in the sums, or without it.
+  double LogNormalization(bool with_own_error) const;
+  // Returns the samples of a channel with outliers, or of relative noise, while they are kept; null
+  // without any.
+  const RobustSamples* KeptSamples(int channel) const;
+  const RelativeSamples* KeptRelative(int channel) const;
+  // Returns χ² of a channel's samples at d = φ(η) − φ(η_0), with the noise of the predictions there
+  // while they are kept.
+  double ChiSquaredAt(int channel, const ConstVectorRef& d) const;
+  // Returns χ² of the model itself at the collocation points, Q × m, and at the check points, C ×
+  // m: what the sums say of the expansion there, or what has the same likelihood as samples that
+  // are kept. Not finite where a trajectory could not be integrated.
+  Matrix PointChiSquared() const;
+  Matrix CheckChiSquared() const;
 
   int64_t rows = 0;
   int64_t samples = 0;            // over all channels

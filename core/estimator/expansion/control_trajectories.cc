@@ -75,34 +75,31 @@ double IntegrationShift(const RegionalExpansion& expansion, const Cost& cost) {
 }
 
 // Compares the check points' own trajectories with the expansion at one sample.
-void RegionalExpansion::Compare(int column, double z, double variance) {
-  const int channel = column % channels_;
+void RegionalExpansion::Compare(const WeightedSample& sample) {
   for (int i = 0; i < trajectories_.checks(); ++i) {
     if (!absorbed_.check_valid[static_cast<size_t>(i)]) continue;
-    const double y = block_.outputs(points() + i, column);
+    const double y = block_.outputs(points() + i, sample.column);
     if (!std::isfinite(y)) {
       absorbed_.check_valid[static_cast<size_t>(i)] = false;
       continue;
     }
-    const double difference = y - block_.check_predictions(i, column);
-    absorbed_.check_chi_squared(i, channel) += (z - y) * (z - y) / variance;
-    absorbed_.check_residual[i] += difference * difference / variance;
+    const double error = sample.value - y;
+    const double difference = y - block_.check_predictions(i, sample.column);
+    absorbed_.check_chi_squared(i, sample.channel) += error * error / sample.noise;
+    absorbed_.check_residual[i] += difference * difference / sample.noise;
   }
 }
 
 RegionalExpansion::Check RegionalExpansion::Checks() const {
   const double samples = std::max<double>(1, static_cast<double>(absorbed_.samples));
-  const std::optional<SampleBySample>& few = absorbed_.few;
-  const Vector& residual = few ? few->check_residual : absorbed_.check_residual;
-  return {few ? WithLogVariances(few->check_chi_squared, few->check_log_variance)
-              : absorbed_.check_chi_squared,
-          (residual / samples).cwiseSqrt(), absorbed_.check_valid, absorbed_.samples};
+  const Vector& residual = absorbed_.few ? absorbed_.few->check_residual : absorbed_.check_residual;
+  return {absorbed_.CheckChiSquared(), (residual / samples).cwiseSqrt(), absorbed_.check_valid,
+          absorbed_.samples};
 }
 
 // Adds c_k δ_k/R_k of one sample.
-void RegionalExpansion::CompareControls(int column, double variance) {
-  const int channel = column % channels_;
-  const auto outputs = block_.outputs.col(column);
+void RegionalExpansion::CompareControls(const WeightedSample& sample) {
+  const auto outputs = block_.outputs.col(sample.column);
   const int first = points() + trajectories_.checks();
   for (int i = 0; i < controls(); ++i) {
     const double difference = outputs[first + i] - outputs[points() + i];
@@ -110,8 +107,8 @@ void RegionalExpansion::CompareControls(int column, double variance) {
       absorbed_.control_valid[static_cast<size_t>(i)] = false;
       continue;
     }
-    absorbed_.control_scores.col(i * channels_ + channel) +=
-        (difference / variance) * block_.coefficients.col(column);
+    absorbed_.control_scores.col(i * channels_ + sample.channel) +=
+        (difference / sample.variance()) * CoefficientsOf(sample);
   }
 }
 

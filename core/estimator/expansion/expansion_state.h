@@ -32,7 +32,7 @@ absl::StatusOr<ExpansionDesign> DesignOf(const ResolvedProblem& problem, DesignS
 struct ExpansionState {
   DesignState design;
   LearnedNoise noise;
-  AbsorbedRows absorbed{0, 0, 0, 0, 0};
+  AbsorbedRows absorbed;
   TrajectoryState trajectories;
 };
 

@@ -28,43 +28,10 @@ int64_t CountOf(const std::vector<Samples>& channels) {
 
 }  // namespace
 
-const RobustSamples* RegionalExpansion::KeptSamples(int channel) const {
-  if (!absorbed_.few) return nullptr;
-  const RobustSamples& samples = absorbed_.few->channels[static_cast<size_t>(channel)];
-  return samples.outliers() == OutlierHandling::kNone ? nullptr : &samples;
-}
-
-const RelativeSamples* RegionalExpansion::KeptRelative(int channel) const {
-  if (!absorbed_.few) return nullptr;
-  const RelativeSamples& samples = absorbed_.few->relative[static_cast<size_t>(channel)];
-  return samples.keeps() ? &samples : nullptr;
-}
-
-double RegionalExpansion::ChiSquaredAt(int channel, const ConstVectorRef& d) const {
-  if (const RelativeSamples* kept = KeptRelative(channel)) return kept->At(d).chi_squared;
-  return absorbed_.sums[static_cast<size_t>(channel)].samples.ChiSquared(d);
-}
-
-Matrix RegionalExpansion::WithLogVariances(Matrix chi_squared, const Matrix& log_variance) const {
-  for (int c = 0; c < channels_; ++c) {
-    if (!KeptRelative(c)) continue;
-    const ChannelSums& sums = absorbed_.sums[static_cast<size_t>(c)];
-    for (Eigen::Index i = 0; i < chi_squared.rows(); ++i) {
-      chi_squared(i, c) = sums.WithLogVariance(chi_squared(i, c), log_variance(i, c));
-    }
-  }
-  return chi_squared;
-}
-
-Matrix RegionalExpansion::PointChiSquared() const {
-  if (!absorbed_.few) return absorbed_.point_chi_squared;
-  return WithLogVariances(absorbed_.few->point_chi_squared, absorbed_.few->point_log_variance);
-}
-
 // Whether the noise of a channel is relative to the predictions, so that its samples are kept. A
 // scale that has not been learned is far too large to tell anything of the predictions.
 bool RegionalExpansion::IsKeptRelative(int channel) const {
-  const NoiseModel& model = problem_.problem().measured[static_cast<size_t>(channel)].noise;
+  const NoiseModel& model = ModelOf(channel);
   return problem_.problem().expansion.adaptive && IsOfPrediction(model) &&
          model.outliers == OutlierHandling::kNone &&
          (!model.unknown || noise_.channels[static_cast<size_t>(channel)].learned);
@@ -77,7 +44,7 @@ void RegionalExpansion::KeepFewSamples() {
   SampleBySample few;
   bool any = false;
   for (int c = 0; c < channels_; ++c) {
-    const NoiseModel& model = problem_.problem().measured[static_cast<size_t>(c)].noise;
+    const NoiseModel& model = ModelOf(c);
     const bool known = !model.unknown && model.correlation != NoiseCorrelation::kUnknown;
     const OutlierHandling outliers = known ? model.outliers : OutlierHandling::kNone;
     few.channels.emplace_back(outliers, design_.basis->size());
@@ -94,13 +61,13 @@ void RegionalExpansion::KeepFewSamples() {
   absorbed_.few = std::move(few);
 }
 
-// Adds a sample after the sums have got it. `z`, its variance `noise` and `lack` are as in the
-// sums, which are what counts for a channel whose samples are not kept.
-void RegionalExpansion::AddToFew(int row, int channel, double z, double noise, double lack) {
-  if (KeptRelative(channel)) {
-    AddRelative(row, channel);
+// Adds a sample after the sums have got it, which are what counts for a channel whose samples are
+// not kept.
+void RegionalExpansion::AddToFew(const WeightedSample& sample) {
+  if (absorbed_.KeptRelative(sample.channel)) {
+    AddRelative(sample);
   } else {
-    AddRobust(channel, block_.Column(row, channel), z, noise, lack);
+    AddRobust(sample);
   }
   const SampleBySample& few = *absorbed_.few;
   const int64_t most = std::max<int64_t>(kMostKept, kMostKeptPerParameter * problem_.dimension());
@@ -111,16 +78,15 @@ void RegionalExpansion::AddToFew(int row, int channel, double z, double noise, d
 
 // Adds a sample of relative noise. R⁰ is the variance at the prediction about which residuals are
 // linearized.
-void RegionalExpansion::AddRelative(int row, int channel) {
+void RegionalExpansion::AddRelative(const WeightedSample& sample) {
   SampleBySample& few = *absorbed_.few;
-  const int column = block_.Column(row, channel);
-  const auto coefficients = block_.coefficients.col(column);
-  const double z = block_.Value(row, channel);
+  const int channel = sample.channel, column = sample.column;
+  const double own_error = sample.own_error;
+  const auto coefficients = CoefficientsOf(sample);
+  const double z = block_.Value(sample.row, channel);  // not scored
   few.largest[channel] = std::max(few.largest[channel], std::abs(z));
-  const auto deviation = RelativeDeviation::Of(
-      problem_.problem().measured[static_cast<size_t>(channel)].noise, few.largest[channel],
-      noise_.channels[static_cast<size_t>(channel)].scale);
-  const double own_error = block_.residual_variance[column] / noise_.misfit_of_weights;
+  const auto deviation = RelativeDeviation::Of(*sample.model, few.largest[channel],
+                                               noise_.channels[static_cast<size_t>(channel)].scale);
   const double sigma = deviation.At(coefficients.dot(linearized_phi_));
   const double reference = sigma * sigma + own_error;
   few.log_noise += std::log(sigma);
@@ -145,22 +111,20 @@ void RegionalExpansion::AddRelative(int row, int channel) {
                                                  deviation, own_error, reference);
 }
 
-void RegionalExpansion::AddRobust(int channel, int column, double z, double noise, double lack) {
+// The normalization of weighted samples is that of the sums (Normalize); kept ones have no weight.
+void RegionalExpansion::AddRobust(WeightedSample sample) {
   SampleBySample& few = *absorbed_.few;
-  RobustSamples& kept = few.channels[static_cast<size_t>(channel)];
+  RobustSamples& kept = few.channels[static_cast<size_t>(sample.channel)];
   const OutlierHandling outliers = kept.outliers();
-  const double sigma = block_.rows.noise[static_cast<size_t>(column)];
-  // The normalization of weighted samples is that of the sums (Normalize).
-  const NoiseModel& model = problem_.problem().measured[static_cast<size_t>(channel)].noise;
-  double normal = VarianceFactor(model.outliers) * sigma * sigma;
+  double normal = VarianceFactor(sample.outliers) * sample.sigma * sample.sigma;
   if (outliers != OutlierHandling::kNone) {
-    noise = normal = sigma * sigma;
-    lack = LackOfDensity(outliers);
+    sample.noise = normal = sample.sigma * sample.sigma;
+    sample.lack = LackOfDensity(outliers);
   }
-  const double own_error = block_.residual_variance[column] / noise_.misfit_of_weights;
-  const double variance = noise + own_error;
-  few.log_noise += 0.5 * std::log(normal) + lack;
-  few.log_variance += 0.5 * std::log(normal + own_error) + lack;
+  const int channel = sample.channel, column = sample.column;
+  const double z = sample.value, variance = sample.variance();
+  few.log_noise += 0.5 * std::log(normal) + sample.lack;
+  few.log_variance += 0.5 * std::log(normal + sample.own_error) + sample.lack;
   few.own_error += block_.residual_variance[column] / variance + absorbed_.carried_rate;
   const auto chi_squared = [&](double y, double scale) {
     return 2 * RobustLoss(outliers, (z - y) / std::sqrt(scale));
@@ -169,14 +133,14 @@ void RegionalExpansion::AddRobust(int channel, int column, double z, double nois
     if (!absorbed_.check_valid[static_cast<size_t>(i)]) continue;
     const double y = block_.outputs(points() + i, column);
     const double difference = y - block_.check_predictions(i, column);
-    few.check_chi_squared(i, channel) += chi_squared(y, noise);
-    few.check_residual[i] += difference * difference / noise;
+    few.check_chi_squared(i, channel) += chi_squared(y, sample.noise);
+    few.check_residual[i] += difference * difference / sample.noise;
   }
   for (Eigen::Index q = 0; q < points(); ++q) {
     few.point_chi_squared(q, channel) += chi_squared(block_.outputs(q, column), variance);
   }
   if (outliers == OutlierHandling::kNone) return;
-  const auto coefficients = block_.coefficients.col(column);
+  const auto coefficients = CoefficientsOf(sample);
   kept.Add(coefficients, z - coefficients.dot(reference_phi_), variance);
 }
 

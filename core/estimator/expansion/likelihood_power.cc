@@ -28,7 +28,7 @@ struct Points {
 Points PointsOf(const RegionalExpansion& expansion, const Cost& cost) {
   const ExpansionDesign& design = expansion.design();
   std::vector<double> least, difference, prior;
-  const Matrix chi_squared_of_points = expansion.PointChiSquared();
+  const Matrix chi_squared_of_points = expansion.absorbed().PointChiSquared();
   for (Eigen::Index q = 0; q < design.points.rows(); ++q) {
     const Vector chi_squared = chi_squared_of_points.row(q).transpose();
     if (!chi_squared.allFinite()) continue;

@@ -6,10 +6,10 @@
 
 namespace polyest::internal {
 
-// Adds ½ log(S/σ²) of one sample, whose weight in the sums is 1/`variance` and not 1/`noise`.
-void RegionalExpansion::AddLogVariance(int column, double noise, double variance) {
-  const double weight = 0.5 * noise / variance;
-  const int channel = column % channels_;
+// Adds ½ log(S/σ²) of one sample, discounted as it is itself by the expansion's own error.
+void RegionalExpansion::AddLogVariance(const WeightedSample& sample) {
+  const double weight = 0.5 * sample.noise / sample.variance();
+  const int channel = sample.channel, column = sample.column;
   ChannelSums& sums = absorbed_.sums[static_cast<size_t>(channel)];
   const auto coefficients = block_.log_variance_coefficients.col(column);
   sums.log_variance += weight * coefficients;

@@ -73,7 +73,7 @@ double ModelMismatch(const RegionalExpansion& expansion, const ConstVectorRef& d
 }
 
 double LargestShift(const RegionalExpansion& expansion, double power) {
-  return std::sqrt(power * expansion.OwnError()) +
+  return std::sqrt(power * expansion.absorbed().OwnError()) +
          power * (expansion.LogVarianceError() + expansion.RoundingError());
 }
 

@@ -29,7 +29,7 @@ void RegionalExpansion::PredictNoise() {
   for (int c = 0; c < channels_; ++c) {
     const ChannelNoise& noise = noise_.channels[static_cast<size_t>(c)];
     if (!noise.of_prediction) continue;
-    const NoiseModel& model = problem_.problem().measured[static_cast<size_t>(c)].noise;
+    const NoiseModel& model = ModelOf(c);
     for (int row = 0; row < block_.fitted_rows; ++row) {
       const int column = block_.Column(row, c);
       double& sigma = block_.rows.noise[static_cast<size_t>(column)];
@@ -45,41 +45,40 @@ void RegionalExpansion::PredictNoise() {
 // Whether the samples of a channel tell of its predictions by their scatter, too: if their noise is
 // relative to the prediction, and known. Outliers would say anything.
 bool RegionalExpansion::IsScored(int channel) const {
-  const NoiseModel& model = problem_.problem().measured[static_cast<size_t>(channel)].noise;
+  const NoiseModel& model = ModelOf(channel);
   return noise_.channels[static_cast<size_t>(channel)].of_prediction && !model.unknown &&
          model.outliers == OutlierHandling::kNone;
 }
 
-ScoredSample RegionalExpansion::Scored(int channel, const ConstVectorRef& coefficients, double z,
-                                       double variance, double own_error) const {
-  const NoiseModel& model = problem_.problem().measured[static_cast<size_t>(channel)].noise;
-  const double y = coefficients.dot(linearized_phi_);
+ScoredSample RegionalExpansion::Scored(const WeightedSample& sample) const {
+  const NoiseModel& model = *sample.model;
+  const double y = CoefficientsOf(sample).dot(linearized_phi_);
   // Where the least noise applies, σ does not change with y.
-  const bool flat = variance <= model.least * model.least;
-  const double slope = flat ? 0 : std::copysign(model.relative, y) / std::sqrt(variance);
-  return Score(z, y, variance, slope, own_error);
+  const bool flat = sample.noise <= model.least * model.least;
+  const double slope = flat ? 0 : std::copysign(model.relative, y) / std::sqrt(sample.noise);
+  return Score(sample.value, y, sample.noise, slope, sample.own_error);
 }
 
 // What filters predict is not linear enough in the parameters of its variance.
-void RegionalExpansion::AddToBlocks(int channel, const ConstVectorRef& coefficients, double z,
-                                    double variance) {
+void RegionalExpansion::AddToBlocks(const WeightedSample& sample) {
   if (problem_.uses_filters()) return;
-  const double unit = 1 / std::sqrt(variance);
+  const auto coefficients = CoefficientsOf(sample);
+  const double unit = 1 / std::sqrt(sample.variance());
   slope_.noalias() = unit * (linearized_gradient_.transpose() * coefficients);
-  absorbed_.blocks[static_cast<size_t>(channel)].Add(
-      slope_, unit * (z - coefficients.dot(linearized_phi_)));
+  absorbed_.blocks[static_cast<size_t>(sample.channel)].Add(
+      slope_, unit * (sample.value - coefficients.dot(linearized_phi_)));
 }
 
 // Adds a sample to the channel's likelihood for other time constants, if there is one.
-void RegionalExpansion::AddToProfile(int row, int channel, const ConstVectorRef& coefficients,
-                                     double z, double variance) {
-  CorrelationProfile& profile = absorbed_.profiles[static_cast<size_t>(channel)];
+void RegionalExpansion::AddToProfile(const WeightedSample& sample) {
+  CorrelationProfile& profile = absorbed_.profiles[static_cast<size_t>(sample.channel)];
   if (profile.empty()) return;
-  const double sigma = block_.Noise(row, channel);
-  slope_.noalias() = (linearized_gradient_.transpose() * coefficients) / sigma;
+  const auto coefficients = CoefficientsOf(sample);
+  slope_.noalias() = (linearized_gradient_.transpose() * coefficients) / sample.sigma;
   // The whitening must be undone with the noise that it was done with; the weight comes after it.
-  profile.Add(block_.Row(row).time_s, slope_, (z - coefficients.dot(linearized_phi_)) / sigma,
-              sigma * sigma / variance);
+  profile.Add(block_.Row(sample.row).time_s, slope_,
+              (sample.value - coefficients.dot(linearized_phi_)) / sample.sigma,
+              sample.sigma * sample.sigma / sample.variance());
 }
 
 }  // namespace polyest::internal

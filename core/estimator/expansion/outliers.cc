@@ -7,50 +7,47 @@
 
 namespace polyest::internal {
 
-// Returns the deviation of the sample in units of its possible error there, or 0 if outliers are
-// not handled. `variance` is that of the sample about the expansion.
-double RegionalExpansion::DeviationFromCentre(int channel, const ConstVectorRef& coefficients,
-                                              double z, double variance) const {
-  const NoiseModel& model = problem_.problem().measured[static_cast<size_t>(channel)].noise;
-  if (model.outliers == OutlierHandling::kNone) return 0;
-  const double error = z - coefficients.dot(centre_phi_);
+double RegionalExpansion::DeviationFromCentre(const WeightedSample& sample) const {
+  if (sample.model->outliers == OutlierHandling::kNone) return 0;
+  const auto coefficients = CoefficientsOf(sample);
+  const double error = sample.value - coefficients.dot(centre_phi_);
+  const double variance = sample.sigma * sample.sigma + sample.own_error;
   const double open = (spread_.transpose() * coefficients).squaredNorm();
   return error / std::sqrt(variance + open);
 }
 
-// Counts the sample if it is an outlier, whose part of χ² is taken for expected. `variance` is R as
-// in the sums: where gross errors are large, the posterior's spread, which only the weight has, is
-// not negligible in their part.
-void RegionalExpansion::CountOutlier(int channel, const ConstVectorRef& coefficients, double z,
-                                     double variance, double deviation) {
-  const auto c = static_cast<size_t>(channel);
+// Counts the sample if it is an outlier, whose part of χ² is taken for expected. Its variance is R
+// as in the sums: where gross errors are large, the posterior's spread, which only the weight has,
+// is not negligible in their part.
+void RegionalExpansion::CountOutlier(const WeightedSample& sample) {
+  const auto c = static_cast<size_t>(sample.channel);
   if (problem_.uses_filters()) {
-    const bool tailed = IsTailed(channel) && FilteredOutlierWeight(deviation) < kOutlierWeight;
+    const bool tailed =
+        IsTailed(sample.channel) && FilteredOutlierWeight(sample.deviation) < kOutlierWeight;
     if (tailed) ++absorbed_.outliers[c];
     return;
   }
-  const OutlierHandling outliers = problem_.problem().measured[c].noise.outliers;
-  if (OutlierWeight(outliers, deviation) >= kOutlierWeight) return;
+  if (OutlierWeight(sample.outliers, sample.deviation) >= kOutlierWeight) return;
   ++absorbed_.outliers[c];
-  const double error = z - coefficients.dot(centre_phi_);
-  absorbed_.sums[c].surplus += error * error / variance - OutlierDegrees(outliers);
+  const double error = sample.value - CoefficientsOf(sample).dot(centre_phi_);
+  absorbed_.sums[c].surplus += error * error / sample.variance() - OutlierDegrees(sample.outliers);
 }
 
-// Adds a weighted sample's density at the centre. `noise` is σ² without the weight, `variance` is R
-// as in the sums, and `lack` what its weight leaves out of the likelihood.
-void RegionalExpansion::AddToDensity(int channel, const ConstVectorRef& coefficients, double z,
-                                     double noise, double own_error, double variance, double lack) {
-  OutlierDensity& density = absorbed_.densities[static_cast<size_t>(channel)];
+// Adds a weighted sample's density at the centre.
+void RegionalExpansion::AddToDensity(const WeightedSample& sample) {
+  OutlierDensity& density = absorbed_.densities[static_cast<size_t>(sample.channel)];
   if (density.outliers() == OutlierHandling::kNone) return;
-  const double all = noise + own_error;
-  const double normalized = VarianceFactor(density.outliers()) * noise + own_error;
-  density.Add((z - coefficients.dot(centre_phi_)) / std::sqrt(all), all / variance,
-              0.5 * std::log(normalized / all) + lack);
+  const double noise = sample.sigma * sample.sigma;
+  const double all = noise + sample.own_error;
+  const double normalized = VarianceFactor(density.outliers()) * noise + sample.own_error;
+  density.Add((sample.value - CoefficientsOf(sample).dot(centre_phi_)) / std::sqrt(all),
+              all / sample.variance(), 0.5 * std::log(normalized / all) + sample.lack);
 }
 
 const OutlierDensity* RegionalExpansion::DensityOfWeighted(int channel) const {
   const OutlierDensity& density = absorbed_.densities[static_cast<size_t>(channel)];
-  if (density.outliers() == OutlierHandling::kNone || KeptSamples(channel)) return nullptr;
+  if (density.outliers() == OutlierHandling::kNone || absorbed_.KeptSamples(channel))
+    return nullptr;
   return &density;
 }
 

@@ -49,7 +49,7 @@ Matrix BestPoints(const RegionalExpansion& expansion, const Cost& cost) {
   const Matrix& points = expansion.design().points;
   Vector least;
   cost.EvaluateMany(points, least);
-  const Matrix chi_squared_of_points = expansion.PointChiSquared();
+  const Matrix chi_squared_of_points = expansion.absorbed().PointChiSquared();
   for (Eigen::Index q = 0; q < points.rows(); ++q) {
     const Vector chi_squared = chi_squared_of_points.row(q).transpose();
     const double model = chi_squared.allFinite()
@@ -102,7 +102,7 @@ Matrix LowestAndOutside(const RegionalExpansion& expansion, const Cost& cost,
 absl::StatusOr<std::unique_ptr<RegionalExpansion>> RunModel(const RegionalExpansion& present,
                                                             const Matrix& etas,
                                                             const Vector& inside,
-                                                            const SettlementRequest& request,
+                                                            const ReexpansionRequest& request,
                                                             const Stop& stop) {
   Truncation truncation =
       FirstTruncation(request.problem->problem().expansion, present.design().region.dimension());
@@ -120,7 +120,7 @@ absl::StatusOr<std::unique_ptr<RegionalExpansion>> RunModel(const RegionalExpans
 // run there. Over a long record an expansion that is accurate in all of its region stands for it.
 absl::StatusOr<std::vector<double>> CostsAt(const RegionalExpansion& expansion, const Cost& cost,
                                             const Matrix& etas, const Matrix& particles,
-                                            const SettlementRequest& request, const Stop& stop,
+                                            const ReexpansionRequest& request, const Stop& stop,
                                             ConfirmedMinima& confirmed) {
   std::vector<double> costs(static_cast<size_t>(etas.rows()), kInfinity);
   if (request.rows > RowsOfShortRecord(*request.problem) &&
@@ -150,7 +150,7 @@ absl::StatusOr<std::vector<double>> CostsAt(const RegionalExpansion& expansion, 
 
 absl::StatusOr<ConfirmedMinima> OverlookedMinima(const RegionalExpansion& expansion,
                                                  const Cost& cost, const Matrix& particles,
-                                                 const SettlementRequest& request,
+                                                 const ReexpansionRequest& request,
                                                  const Stop& stop) {
   ConfirmedMinima confirmed{.points = Matrix(0, cost.dimension())};
   const Matrix etas = LowestAndOutside(expansion, cost, particles, request.guesses, stop);

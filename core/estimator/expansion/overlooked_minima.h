@@ -25,7 +25,7 @@ struct ConfirmedMinima {
 // error on a stop request or when the store cannot be read.
 absl::StatusOr<ConfirmedMinima> OverlookedMinima(const RegionalExpansion& expansion,
                                                  const Cost& cost, const Matrix& particles,
-                                                 const SettlementRequest& request,
+                                                 const ReexpansionRequest& request,
                                                  const Stop& stop);
 
 // Returns points (count × n, germ coordinates) of the normal distribution around a minimum (local

@@ -9,12 +9,12 @@
 
 #include "core/common/infeasible.h"
 #include "core/common/status.h"
-#include "core/estimator/expansion/carry_over.h"
+#include "core/estimator/expansion/expansion_mover.h"
 #include "core/estimator/expansion/likelihood_power.h"
 #include "core/estimator/expansion/model_agreement.h"
 #include "core/estimator/expansion/overlooked_minima.h"
+#include "core/estimator/expansion/reexpansion_particles.h"
 #include "core/estimator/expansion/return_to_prior.h"
-#include "core/estimator/expansion/settlement_particles.h"
 #include "core/estimator/problem/truncation.h"
 
 namespace polyest::internal {
@@ -39,51 +39,52 @@ constexpr double kWiden = 1.5, kWidest = 4;
 // are added.
 constexpr double kWidenedShift = 0.1 * kNegligibleShift;
 
-// Carries out one settlement; holds the state that changes between attempts.
-class Settler {
+// Carries out one re-expansion; holds what changes between its attempts.
+class Reexpander {
  public:
-  Settler(const RegionalExpansion& present, const SettlementRequest& request, const Stop& stop)
-      : present_(present), request_(request), stop_(stop) {}
+  Reexpander(const RegionalExpansion& present, const ReexpansionRequest& request, const Stop& stop)
+      : present_(present), request_(request), stop_(stop), mover_(present, request, stop) {}
 
-  absl::StatusOr<Settlement> Run() {
-    result_.particles = request_.guesses;
-    result_.memory = request_.memory;
-    result_.allowance = request_.allowance;
-    if (IsInVain()) return std::move(result_);
+  absl::StatusOr<Reexpansion> Run() && {
+    drawn_.xis = request_.guesses;
+    memory_ = request_.memory;
+    if (!WouldChangeNothing()) POLYEST_RETURN_IF_ERROR(Attempt());
+    return Reexpansion{.moves = std::move(mover_).TakeMoves(),
+                       .particles = std::move(drawn_.xis),
+                       .memory = std::move(memory_),
+                       .overlooked = overlooked_};
+  }
+
+ private:
+  absl::Status Attempt() {
     if (StaysOnPrior()) {
       POLYEST_RETURN_IF_ERROR(Sample(/*attempt=*/0).status());
     } else {
       POLYEST_RETURN_IF_ERROR(FollowPosterior());
     }
-    if (!result_.expansion) POLYEST_RETURN_IF_ERROR(TryPrior());
-    return std::move(result_);
+    return mover_.has_moved() ? absl::OkStatus() : TryPrior();
   }
 
- private:
   absl::Status FollowPosterior() {
     bool may_move = true;
     for (int attempt = 0; attempt < kMaxAttempts; ++attempt) {
       POLYEST_ASSIGN_OR_RETURN(const bool sampled, Sample(attempt));
       if (!sampled) break;
-      const ExpansionDesign& design = expansion().design();
-      const std::vector<int> leaning = Leaning(design, particles_.etas);
+      const std::vector<int> leaning = Leaning(design(), etas_);
       if (!leaning.empty()) {
         POLYEST_ASSIGN_OR_RETURN(const bool moved, Widen(leaning));
         if (!moved) break;
         has_widened_ = true;
-        result_.memory.costs.resize(0);  // the particles end at the edge
+        memory_.costs.resize(0);  // the particles end at the edge
         continue;
       }
       if (!may_move) break;
-      if (Pays(RegionOfParticles(result_.particles))) {
+      if (Pays(RegionOfParticles(drawn_.xis))) {
         POLYEST_RETURN_IF_ERROR(AddOverlooked(attempt));
-        if (result_.overlooked && request_.ends_at_overlooked) break;
+        if (overlooked_ && request_.ends_at_overlooked) break;
       }
-      const Region region = RegionOfParticles(result_.particles);
-      if (!Pays(region)) {
-        if (!result_.expansion) POLYEST_RETURN_IF_ERROR(RaiseOrder(TrustedRegion(design)));
-        break;
-      }
+      const Region region = RegionOfParticles(drawn_.xis);
+      if (!Pays(region)) return mover_.has_moved() ? absl::OkStatus() : RaiseOrder();
       POLYEST_ASSIGN_OR_RETURN(const bool moved, Contract(region));
       if (!moved) break;
       may_move = power_ < 1;
@@ -91,21 +92,23 @@ class Settler {
     return absl::OkStatus();
   }
 
-  const RegionalExpansion& expansion() const {
-    return result_.expansion ? *result_.expansion : present_;
-  }
-
+  const RegionalExpansion& expansion() const { return mover_.expansion(); }
+  const ExpansionDesign& design() const { return expansion().design(); }
   const ExpansionOptions& options() const { return request_.problem->problem().expansion; }
-  const Truncation& present() const { return expansion().design().basis->truncation(); }
+  Cost MakeCost() const { return expansion().MakeCost(request_.problem->problem().regularization); }
 
   Truncation OneOrderLess() const {
     Truncation truncation = FirstTruncation(options(), request_.problem->dimension());
-    truncation.order = std::max(truncation.order, present().order - 1);
+    truncation.order = std::max(truncation.order, mover_.truncation().order - 1);
     return truncation;
   }
 
+  std::optional<Truncation> NextOrder() const {
+    return NextTruncation(options(), request_.problem->dimension(), mover_.truncation());
+  }
+
   bool IsOnPrior() const {
-    return !result_.expansion && HasReturnedToPrior(*request_.problem, present_.design());
+    return !mover_.has_moved() && HasReturnedToPrior(*request_.problem, present_.design());
   }
 
   // Whether the expansion has returned to the prior not long ago.
@@ -116,22 +119,19 @@ class Settler {
 
   // Returns to the prior if this serves (return_to_prior.h).
   absl::Status TryPrior() {
-    if (result_.memory.costs.size() == 0 || !MayReturnToPrior(present_, request_)) {
+    if (memory_.costs.size() == 0 || !MayReturnToPrior(present_, request_)) {
       return absl::OkStatus();
     }
-    result_.postponed = result_.postponed || Withheld();
-    if (Withheld()) return absl::OkStatus();
-    POLYEST_ASSIGN_OR_RETURN(PriorReturn found,
-                             ReturnToPrior(present_, request_, result_.particles,
-                                           result_.memory.costs, result_.allowance, stop_));
-    result_.propagated_rows += found.propagated_rows;
-    PriorTried& memory = result_.memory.prior;
-    memory.tried = request_.rows;
-    memory.in_vain = !found.expansion;
+    if (mover_.PostponedIfWithheld()) return absl::OkStatus();
+    POLYEST_ASSIGN_OR_RETURN(
+        PriorReturn found,
+        ReturnToPrior(present_, request_, drawn_.xis, memory_.costs, mover_.allowance(), stop_));
+    mover_.CountPropagated(found.propagated_rows);
+    memory_.prior.tried = request_.rows;
+    memory_.prior.in_vain = !found.expansion;
     if (!found.expansion) return absl::OkStatus();
-    if (!IsOnPrior()) memory.stays_from = request_.rows;
-    result_.expansion = std::move(found.expansion);
-    ++result_.reexpansions;
+    if (!IsOnPrior()) memory_.prior.stays_from = request_.rows;
+    mover_.Adopt(std::move(found.expansion));
     return absl::OkStatus();
   }
 
@@ -140,52 +140,43 @@ class Settler {
                        WithinKnown(*request_.problem, design.element), etas);
   }
 
-  // Whether the particles of the last settlement say that this one would leave all as it is. In
+  // Whether the particles of the last re-expansion say that this one would leave all as it is. In
   // more dimensions, where elements are few, drawing them again is the surer search for pieces of
   // the posterior that they overlooked.
-  bool IsInVain() const {
+  bool WouldChangeNothing() const {
     if (request_.problem->dimension() > kFewDimensions) return false;
-    const ExpansionDesign& design = present_.design();
-    if (MayRaiseOrder(TrustedRegion(design))) return false;
-    Cost cost = present_.MakeCost(request_.problem->problem().regularization);
-    cost.set_power(LikelihoodPower(present_, cost));
-    const Matrix etas = Reweighted(request_.guesses, request_.memory.costs, cost, design);
-    return etas.rows() > 0 && Leaning(design, etas).empty() &&
-           !Pays(RegionOfParticles(design.region.ManyToGerm(etas)));
+    if (MayRaiseOrder(TrustedRegion(design()))) return false;
+    Cost cost = MakeCost();
+    cost.set_power(LikelihoodPower(expansion(), cost));
+    const Matrix etas = Reweighted(request_.guesses, request_.memory.costs, cost, design());
+    return etas.rows() > 0 && Leaning(design(), etas).empty() &&
+           !Pays(RegionOfParticles(design().region.ManyToGerm(etas)));
   }
 
   // Whether a higher order is allowed and may follow the model over the region.
   bool MayRaiseOrder(const Region& region) const {
-    return request_.may_raise_order &&
-           NextTruncation(options(), request_.problem->dimension(), present()) &&
+    return request_.may_raise_order && NextOrder() &&
            !IsRaisingInVain(request_.memory.order, kMaxErrorOfRaised, region, request_.rows,
                             present_.noise());
   }
 
   // Raises the order to the first one that follows the model; the present order stays if none does.
-  absl::Status RaiseOrder(const Region& region) {
-    if (!MayRaiseOrder(region)) return absl::OkStatus();
-    result_.postponed = Withheld();
-    if (Withheld()) return absl::OkStatus();
+  absl::Status RaiseOrder() {
+    const Region region = TrustedRegion(design());
+    if (!MayRaiseOrder(region) || mover_.PostponedIfWithheld()) return absl::OkStatus();
     OrderInVain tried;
-    auto next = NextTruncation(options(), request_.problem->dimension(), present());
-    for (; next; next = NextTruncation(options(), request_.problem->dimension(), *next)) {
-      POLYEST_ASSIGN_OR_RETURN(const bool raised, Move(region, *next));
-      if (!raised && Withheld()) {  // not for what it would have shown
-        result_.postponed = true;
-        return absl::OkStatus();
-      }
-      const double error = raised ? ErrorOf(*result_.expansion) : kMaxError;
+    for (auto next = NextOrder(); next; next = NextOrder()) {
+      POLYEST_ASSIGN_OR_RETURN(const bool raised, mover_.Move({region, *next, {}}, drawn_));
+      if (!raised && mover_.PostponedIfWithheld()) return absl::OkStatus();
+      const double error = raised ? ErrorOf(expansion()) : kMaxError;
       if (error <= kMaxErrorOfRaised) return absl::OkStatus();
       if (tried.order == 0 || error < tried.error) {
         tried = TriedInVain(next->order, error, region, request_.rows, present_.noise());
       }
       if (!raised) break;
     }
-    result_.memory.order = std::move(tried);
-    if (!result_.expansion) return absl::OkStatus();
-    result_.propagated_rows += result_.expansion->propagated_rows();
-    result_.expansion.reset();
+    memory_.order = std::move(tried);
+    mover_.GoBack();
     return absl::OkStatus();
   }
 
@@ -200,20 +191,20 @@ class Settler {
     return discount / std::max(samples - discount, std::numeric_limits<double>::min());
   }
 
-  // Returns false when the sampler finds no starting point.
+  // Draws particles on the expansion reached so far. Returns false when the sampler finds no
+  // starting point.
   absl::StatusOr<bool> Sample(int attempt) {
-    Cost cost = expansion().MakeCost(request_.problem->problem().regularization);
+    Cost cost = MakeCost();
     power_ = std::min(LikelihoodPower(expansion(), cost),
                       PowerOfFirstSamples(*request_.problem, request_.rows));
     cost.set_power(power_);
-    absl::StatusOr<Particles> particles =
-        SampleForSettlement(cost, expansion().design(), result_.particles,
-                            request_.seed + static_cast<uint64_t>(attempt), stop_);
+    absl::StatusOr<Particles> particles = SampleForReexpansion(
+        cost, design(), drawn_.xis, request_.seed + static_cast<uint64_t>(attempt), stop_);
     if (IsInfeasible(particles.status())) return false;
     if (!particles.ok()) return particles.status();
-    particles_ = *std::move(particles);
-    result_.particles = expansion().design().region.ManyToGerm(particles_.etas);
-    result_.memory.costs = particles_.costs;
+    etas_ = std::move(particles->etas);
+    drawn_ = {design().region.ManyToGerm(etas_), std::move(particles->costs)};
+    memory_.costs = drawn_.costs;
     return true;
   }
 
@@ -222,45 +213,46 @@ class Settler {
   // not soon come to an edge once more: the error grows as the power p + 1 of the width.
   absl::StatusOr<bool> Widen(const std::vector<int>& leaning) {
     const auto widened = [&](double factor) {
-      return WidenedRegion(expansion().design(), particles_.etas, leaning, factor);
+      return WidenedRegion(design(), etas_, leaning, factor);
     };
     const double room = kWidenedShift / LargestShift(expansion(), /*power=*/1);
-    const double factor = std::min(std::pow(room, 1.0 / (present().order + 1)), kWidest);
-    std::optional<Region> wider;
+    const double factor = std::min(std::pow(room, 1.0 / (mover_.truncation().order + 1)), kWidest);
+    MoveTarget target{widened(kWiden), mover_.truncation(), {}};
     // The record may have to be propagated once more, over the region that is less wide.
-    if (factor > kWiden && result_.allowance.Allows(request_.rows, 2 * request_.rows)) {
-      wider = widened(factor);
+    if (factor > kWiden && mover_.allowance().Allows(request_.rows, 2 * request_.rows)) {
+      target.wider = widened(factor);
     }
-    return Move(widened(kWiden), present(), wider);
+    return mover_.Move(target, drawn_);
   }
 
-  // Returns whether a contraction to the region saves enough. A region that this settlement has
+  // Returns whether a contraction to the region saves enough. A region that this re-expansion has
   // widened stays as it is if the expansion is as good as the model all over it.
   bool Pays(const Region& region) const {
     if (IsOnPrior() && LargestShift(expansion(), /*power=*/1) <= kAccurateShift) return false;
     if (has_widened_ && LargestShift(expansion(), /*power=*/1) <= kNegligibleShift) return false;
-    return region.LogVolume() < std::log(kPays) + TrustedRegion(expansion().design()).LogVolume();
+    return region.LogVolume() < std::log(kPays) + TrustedRegion(design()).LogVolume();
   }
 
   // Puts particles around minima that a contraction to the region of the particles would lose.
   absl::Status AddOverlooked(int attempt) {
-    Cost cost = expansion().MakeCost(request_.problem->problem().regularization);
+    Cost cost = MakeCost();
     cost.set_power(power_);
-    POLYEST_ASSIGN_OR_RETURN(
-        const ConfirmedMinima found,
-        OverlookedMinima(expansion(), cost, result_.particles, RequestNow(), stop_));
-    result_.propagated_rows += found.propagated_rows;
-    if (found.propagated_rows > 0) result_.allowance.Use(request_.rows, request_.rows);
-    const auto each = static_cast<Eigen::Index>(
-        std::ceil(kShareOfOverlooked * static_cast<double>(result_.particles.rows())));
-    Eigen::Index row = result_.particles.rows();
+    ReexpansionRequest request = request_;
+    request.allowance = mover_.allowance();
+    POLYEST_ASSIGN_OR_RETURN(const ConfirmedMinima found,
+                             OverlookedMinima(expansion(), cost, drawn_.xis, request, stop_));
+    mover_.CountPropagated(found.propagated_rows);
+    if (found.propagated_rows > 0) mover_.allowance().Use(request_.rows, request_.rows);
+    Eigen::Index row = drawn_.xis.rows();
+    const auto each =
+        static_cast<Eigen::Index>(std::ceil(kShareOfOverlooked * static_cast<double>(row)));
     for (Eigen::Index i = 0; i < found.points.rows() && row >= 2 * each; ++i) {
       row -= each;
-      result_.particles.middleRows(row, each) =
+      drawn_.xis.middleRows(row, each) =
           DrawsAround(cost, found.points.row(i).transpose(), each,
                       request_.seed + static_cast<uint64_t>(attempt) + static_cast<uint64_t>(i));
-      result_.memory.costs.resize(0);  // the particles are no draws any more
-      result_.overlooked = found.error <= kMaxErrorAtMinima;
+      memory_.costs.resize(0);  // the particles are no draws any more
+      overlooked_ = found.error <= kMaxErrorAtMinima;
     }
     return absl::OkStatus();
   }
@@ -268,129 +260,51 @@ class Settler {
   // Moves the expansion to a smaller region. One that has returned to the prior keeps its order,
   // and stays if it would be less accurate there.
   absl::StatusOr<bool> Contract(const Region& region) {
-    if (!IsOnPrior()) return Move(region, OneOrderLess());
+    if (!IsOnPrior()) return mover_.Move({region, OneOrderLess(), {}}, drawn_);
     const double before = LargestShift(present_, /*power=*/1);
-    POLYEST_ASSIGN_OR_RETURN(const bool moved, Move(region, present()));
+    POLYEST_ASSIGN_OR_RETURN(const bool moved,
+                             mover_.Move({region, mover_.truncation(), {}}, drawn_));
     if (!moved || LargestShift(expansion(), /*power=*/1) <= before) return moved;
-    result_.memory.prior.stays_from = request_.rows;
-    result_.propagated_rows += result_.expansion->propagated_rows();
-    result_.expansion.reset();
+    memory_.prior.stays_from = request_.rows;
+    mover_.GoBack();
     return false;
   }
 
-  // Returns a design over the region whose check points are the first particles.
-  ExpansionDesign DesignOn(Region region, const Truncation& truncation) const {
-    const Vector inside = result_.particles.colwise().mean().transpose();
-    ExpansionDesign design =
-        DesignForRegion(*request_.problem, truncation, std::move(region), inside);
-    design.element = present_.design().element;
-    SetDrawnChecks(result_.particles, particles_.costs, design);
-    return design;
-  }
-
-  // Whether the allowance forbids to propagate the record from its beginning.
-  bool Withheld() const { return !result_.allowance.AllowsRecord(request_.rows); }
-
-  SettlementRequest RequestNow() const {
-    SettlementRequest request = request_;
-    request.allowance = result_.allowance;
-    return request;
-  }
-
-  // Moves the sums to the region without propagating the record, with no fewer terms.
-  absl::StatusOr<std::unique_ptr<RegionalExpansion>> Carried(const Region& region,
-                                                             const Truncation& truncation) {
-    if (request_.rows <= RowsOfShortRecord(*request_.problem)) {
-      return InfeasibleError("the record is short");
-    }
-    const int64_t cost = RowsToCarryOver(expansion(), request_.rows);
-    if (!result_.allowance.Allows(request_.rows, cost)) {
-      return InfeasibleError("too many rows would be propagated again");
-    }
-    const double max_shift = Withheld() ? kMaxShiftUnderLimit : kMaxCarriedShift;
-    const Truncation& terms = truncation.order < present().order ? present() : truncation;
-    auto carried = CarryOver(*request_.problem, expansion(), DesignOn(region, terms),
-                             *request_.store, request_.rows, request_.threads, stop_, max_shift);
-    result_.allowance.Use(request_.rows, cost);
-    return carried;
-  }
-
-  // Propagates the record over the region.
-  absl::StatusOr<std::unique_ptr<RegionalExpansion>> Replayed(const Region& region,
-                                                              const Truncation& truncation) {
-    auto replayed =
-        Replay(*request_.problem, DesignOn(region, truncation), present_.noise().ForNewExpansion(),
-               *request_.store, request_.rows, request_.threads, stop_);
-    result_.allowance.Use(request_.rows, request_.rows);
-    return replayed;
-  }
-
-  // Propagates the record over the wider region, or over `region` where more trajectories fail in
-  // the wider one than in the present.
-  absl::StatusOr<std::unique_ptr<RegionalExpansion>> ReplayedWide(const Region& wider,
-                                                                  const Region& region,
-                                                                  const Truncation& truncation) {
-    auto replayed = Replayed(wider, truncation);
-    if (replayed.ok()) {
-      if ((*replayed)->failures().size() <= expansion().failures().size()) return replayed;
-      result_.propagated_rows += (*replayed)->propagated_rows();
-    } else if (!IsInfeasible(replayed.status())) {
-      return replayed;
-    }
-    return Replayed(region, truncation);
-  }
-
-  // Moves the expansion to the region, or to the wider one, if there is one, where the record must
-  // be propagated again. Returns false when no expansion can be built; the present one then stays.
-  absl::StatusOr<bool> Move(const Region& region, const Truncation& truncation,
-                            const std::optional<Region>& wider = std::nullopt) {
-    absl::StatusOr<std::unique_ptr<RegionalExpansion>> moved = Carried(region, truncation);
-    if (IsInfeasible(moved.status()) && request_.may_replay) {
-      result_.postponed = Withheld();
-      if (Withheld()) return false;
-      moved = wider ? ReplayedWide(*wider, region, truncation) : Replayed(region, truncation);
-    }
-    if (IsInfeasible(moved.status())) return false;
-    if (!moved.ok()) return moved.status();
-    if (result_.expansion) result_.propagated_rows += result_.expansion->propagated_rows();
-    result_.expansion = *std::move(moved);
-    result_.postponed = false;
-    ++result_.reexpansions;
-    return true;
-  }
-
   const RegionalExpansion& present_;
-  const SettlementRequest& request_;
+  const ReexpansionRequest& request_;
   const Stop& stop_;
-  double power_ = 1;  // of the likelihood from which the particles were drawn
+  ExpansionMover mover_;
+  DrawnPoints drawn_;  // the posterior's particles
+  Matrix etas_;        // the same by local coordinates of the expansion they were drawn on
+  ReexpansionMemory memory_;
+  double power_ = 1;  // of the likelihood from which they were drawn
   bool has_widened_ = false;
-  Particles particles_;
-  Settlement result_;
+  bool overlooked_ = false;  // Reexpansion::overlooked
 };
 
 }  // namespace
 
-absl::StatusOr<Settlement> MakeSettlement(const RegionalExpansion& present,
-                                          const SettlementRequest& request, const Stop& stop) {
-  return Settler(present, request, stop).Run();
+absl::StatusOr<Reexpansion> Reexpand(const RegionalExpansion& present,
+                                     const ReexpansionRequest& request, const Stop& stop) {
+  return Reexpander(present, request, stop).Run();
 }
 
-absl::StatusOr<Settlement> ContinueSettlement(const RegionalExpansion& present, Settlement begun,
-                                              SettlementRequest request, const Stop& stop) {
+absl::StatusOr<Reexpansion> ContinueReexpansion(const RegionalExpansion& present, Reexpansion begun,
+                                                ReexpansionRequest request, const Stop& stop) {
   request.guesses = std::move(begun.particles);
   request.memory = std::move(begun.memory);
-  request.allowance = begun.allowance;
-  const RegionalExpansion& reached = begun.expansion ? *begun.expansion : present;
-  POLYEST_ASSIGN_OR_RETURN(Settlement settlement, MakeSettlement(reached, request, stop));
-  settlement.reexpansions += begun.reexpansions;
-  settlement.propagated_rows += begun.propagated_rows;
-  if (!begun.expansion) return settlement;
-  if (settlement.expansion) {
-    settlement.propagated_rows += begun.expansion->propagated_rows();
+  request.allowance = begun.moves.allowance;
+  const RegionalExpansion& reached = begun.moves.expansion ? *begun.moves.expansion : present;
+  POLYEST_ASSIGN_OR_RETURN(Reexpansion next, Reexpand(reached, request, stop));
+  next.moves.reexpansions += begun.moves.reexpansions;
+  next.moves.propagated_rows += begun.moves.propagated_rows;
+  if (!begun.moves.expansion) return next;
+  if (next.moves.expansion) {
+    next.moves.propagated_rows += begun.moves.expansion->propagated_rows();
   } else {
-    settlement.expansion = std::move(begun.expansion);
+    next.moves.expansion = std::move(begun.moves.expansion);
   }
-  return settlement;
+  return next;
 }
 
 }  // namespace polyest::internal

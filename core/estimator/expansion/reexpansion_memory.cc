@@ -1,4 +1,4 @@
-#include "core/estimator/expansion/settlement_memory.h"
+#include "core/estimator/expansion/reexpansion_memory.h"
 
 #include <cmath>
 

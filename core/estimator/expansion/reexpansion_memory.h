@@ -1,9 +1,9 @@
 #pragma once
 
-// What earlier settlements (reexpansion.h) have found, so that nothing is tried again that failed
+// What earlier re-expansions (reexpansion.h) have found, so that nothing is tried again that failed
 // before and must fail again.
 //
-// A settlement leaves particles of the posterior and their costs. As long as these particles,
+// A re-expansion leaves particles of the posterior and their costs. As long as these particles,
 // reweighted to the present cost, keep nine tenths of their number as effective size, the posterior
 // has hardly moved, and what they say of the region is what new ones would say. Where they neither
 // lean on an edge nor would fit into a region of half the volume, no new ones are drawn. That holds
@@ -41,7 +41,7 @@ struct PriorTried {
   bool in_vain = false;    // whether it has led to nothing
 };
 
-struct SettlementMemory {
+struct ReexpansionMemory {
   // The negative log density from which the particles were drawn, up to a constant; empty if it is
   // unknown.
   Vector costs;

@@ -1,4 +1,4 @@
-#include "core/estimator/expansion/settlement_particles.h"
+#include "core/estimator/expansion/reexpansion_particles.h"
 
 #include <algorithm>
 
@@ -17,9 +17,9 @@ constexpr int kSweeps = 40;
 
 }  // namespace
 
-absl::StatusOr<Particles> SampleForSettlement(const Cost& cost, const ExpansionDesign& design,
-                                              const Matrix& guesses, uint64_t seed,
-                                              const Stop& stop) {
+absl::StatusOr<Particles> SampleForReexpansion(const Cost& cost, const ExpansionDesign& design,
+                                               const Matrix& guesses, uint64_t seed,
+                                               const Stop& stop) {
   SamplerOptions options;
   options.seed = seed;
   const Matrix local = design.region.ManyToLocal(guesses);

@@ -1,6 +1,6 @@
 #pragma once
 
-// Particles of the posterior on an expansion, for a settlement (reexpansion.h): by importance
+// Particles of the posterior on an expansion, for a re-expansion (reexpansion.h): by importance
 // sampling where the posterior is nearly Gaussian or a mixture of such modes
 // (guarded_importance.h), which needs some ten thousand evaluations of the cost, and elsewhere by
 // tempering (bayes/posterior.h), which needs some hundred thousand.
@@ -19,8 +19,8 @@ namespace polyest::internal {
 // (any number × n, may be none; germ coordinates) are particles of an earlier posterior. They
 // depend on the arguments alone. Returns InfeasibleError if the cost is finite almost nowhere;
 // otherwise only a stop request returns an error.
-absl::StatusOr<Particles> SampleForSettlement(const Cost& cost, const ExpansionDesign& design,
-                                              const Matrix& guesses, uint64_t seed,
-                                              const Stop& stop);
+absl::StatusOr<Particles> SampleForReexpansion(const Cost& cost, const ExpansionDesign& design,
+                                               const Matrix& guesses, uint64_t seed,
+                                               const Stop& stop);
 
 }  // namespace polyest::internal

@@ -12,23 +12,6 @@
 
 namespace polyest::internal {
 
-AbsorbedRows::AbsorbedRows(int terms, int channels, Eigen::Index points, Eigen::Index check_points,
-                           int controls)
-    : sums(static_cast<size_t>(channels), ChannelSums(terms)),
-      discount(Vector::Zero(channels)),
-      outliers(static_cast<size_t>(channels), 0),
-      densities(static_cast<size_t>(channels)),
-      previous_coefficients(Matrix::Zero(terms, channels)),
-      previous_error(Vector::Zero(channels)),
-      profiles(static_cast<size_t>(channels)),
-      largest(Vector::Zero(channels)),
-      check_chi_squared(Matrix::Zero(check_points, channels)),
-      check_residual(Vector::Zero(check_points)),
-      check_valid(static_cast<size_t>(check_points), true),
-      point_chi_squared(Matrix::Zero(points, channels)),
-      control_scores(Matrix::Zero(terms, controls * channels)),
-      control_valid(static_cast<size_t>(controls), true) {}
-
 absl::StatusOr<std::unique_ptr<RegionalExpansion>> RegionalExpansion::Make(
     const ResolvedProblem& problem, const SampleStore* store, ExpansionDesign design,
     LearnedNoise noise, int threads, const Stop& stop) {
@@ -48,8 +31,11 @@ RegionalExpansion::RegionalExpansion(const ResolvedProblem& problem, const Sampl
       channels_(problem.channels()),
       reference_phi_(design_.basis->size()),
       trajectories_(problem_, store, design_, noise_.channels, std::move(matrix), threads),
-      absorbed_(design_.basis->size(), channels_, trajectories_.points(), trajectories_.checks(),
-                trajectories_.controls()),
+      absorbed_({.terms = design_.basis->size(),
+                 .channels = channels_,
+                 .points = trajectories_.points(),
+                 .check_points = trajectories_.checks(),
+                 .controls = trajectories_.controls()}),
       difference_(design_.basis->size()) {
   POLYEST_CHECK(static_cast<int>(noise_.channels.size()) == channels_);
   design_.basis->Evaluate(design_.reference, reference_phi_);
@@ -64,7 +50,7 @@ RegionalExpansion::RegionalExpansion(const ResolvedProblem& problem, const Sampl
 // Sets how the sums of each channel become a likelihood.
 void RegionalExpansion::BeginSums() {
   for (int c = 0; c < channels_; ++c) {
-    const NoiseModel& model = problem_.problem().measured[static_cast<size_t>(c)].noise;
+    const NoiseModel& model = ModelOf(c);
     ChannelSums& sums = absorbed_.sums[static_cast<size_t>(c)];
     const bool learned = noise_.channels[static_cast<size_t>(c)].learned;
     sums.scale_unknown = model.unknown && learned;
@@ -159,7 +145,9 @@ void RegionalExpansion::Absorb(int row) {
     absorbed_.summed_run = run;
     absorbed_.carried_rate = 0;
   }
-  for (int c = 0; c < channels_; ++c) AbsorbSample(row, c);
+  for (int c = 0; c < channels_; ++c) {
+    if (block_.Noise(row, c) > 0) AbsorbSample(Weighted(row, c));
+  }
   if (problem_.ended_runs() == nullptr) {
     absorbed_.windows.EndRow(absorbed_.sums, run, time_s);
   }
@@ -167,61 +155,65 @@ void RegionalExpansion::Absorb(int row) {
   absorbed_.propagated += trajectories_.count();
 }
 
-void RegionalExpansion::AbsorbSample(int row, int c) {
-  const double sigma = block_.Noise(row, c);
-  if (sigma <= 0) return;  // no sample
-  double z = block_.Value(row, c);
-  const int column = block_.Column(row, c);
-  const double own_error = block_.residual_variance[column] / noise_.misfit_of_weights;
-  const auto coefficients = block_.coefficients.col(column);
-  const NoiseModel& model = problem_.problem().measured[static_cast<size_t>(c)].noise;
-  const double deviation = DeviationFromCentre(c, coefficients, z, sigma * sigma + own_error);
+WeightedSample RegionalExpansion::Weighted(int row, int channel) const {
+  WeightedSample sample{.row = row, .channel = channel, .column = block_.Column(row, channel)};
+  sample.model = &ModelOf(channel);
+  sample.value = block_.Value(row, channel);
+  sample.sigma = block_.Noise(row, channel);
+  sample.own_error = block_.residual_variance[sample.column] / noise_.misfit_of_weights;
+  sample.deviation = DeviationFromCentre(sample);
   // Filters handle outliers themselves.
-  const OutlierHandling outliers =
-      problem_.uses_filters() ? OutlierHandling::kNone : model.outliers;
-  const double weight = OutlierWeight(outliers, deviation);
-  // e = z − cᵀφ_0,  R = σ²/w + ρ
-  double noise = VarianceFactor(outliers) * sigma * sigma / weight;
-  double lack = problem_.uses_filters() && IsTailed(c) ? LackOfDensity(model.outliers)
-                                                       : LackOfWeight(outliers, deviation);
-  if (IsScored(c)) {
-    const ScoredSample scored = Scored(c, coefficients, z, noise, own_error);
-    z = scored.value;
-    noise = scored.noise_variance;
-    lack += scored.lack;
-  }
-  const double variance = noise + own_error;
-  const double error = z - coefficients.dot(reference_phi_);
-  absorbed_.sums[static_cast<size_t>(c)].samples.Add(coefficients, error, variance);
-  AddDifference(c, coefficients, error, variance);
-  AddToProfile(row, c, coefficients, z, variance);
-  AddToBlocks(c, coefficients, z, variance);
-  AddOwnError(c, column, own_error, variance);
-  Normalize(VarianceFactor(outliers) * sigma * sigma, own_error, lack);
-  CountOutlier(c, coefficients, z, variance, deviation);
-  AddToDensity(c, coefficients, z, sigma * sigma, own_error, variance, lack);
-  Compare(column, z, noise);
-  CompareControls(column, variance);
-  if (absorbed_.few) AddToFew(row, c, z, noise, lack);
-  if (problem_.uses_filters()) AddLogVariance(column, noise, variance);
+  if (!problem_.uses_filters()) sample.outliers = sample.model->outliers;
+  const double weight = OutlierWeight(sample.outliers, sample.deviation);
+  sample.noise = VarianceFactor(sample.outliers) * sample.sigma * sample.sigma / weight;
+  sample.lack = problem_.uses_filters() && IsTailed(channel)
+                    ? LackOfDensity(sample.model->outliers)
+                    : LackOfWeight(sample.outliers, sample.deviation);
+  if (!IsScored(channel)) return sample;
+  const ScoredSample scored = Scored(sample);
+  sample.value = scored.value;
+  sample.noise = scored.noise_variance;
+  sample.lack += scored.lack;
+  return sample;
+}
+
+void RegionalExpansion::AbsorbSample(const WeightedSample& sample) {
+  const auto coefficients = CoefficientsOf(sample);
+  const double variance = sample.variance();
+  // e = z − cᵀφ_0
+  const double error = sample.value - coefficients.dot(reference_phi_);
+  absorbed_.sums[static_cast<size_t>(sample.channel)].samples.Add(coefficients, error, variance);
+  AddDifference(sample, error);
+  AddToProfile(sample);
+  AddToBlocks(sample);
+  AddOwnError(sample);
+  Normalize(sample);
+  CountOutlier(sample);
+  AddToDensity(sample);
+  Compare(sample);
+  CompareControls(sample);
+  if (absorbed_.few) AddToFew(sample);
+  if (problem_.uses_filters()) AddLogVariance(sample);
   // χ²_q += (z − y_q)²/R
-  absorbed_.point_chi_squared.col(c).array() +=
-      (block_.outputs.col(column).head(points()).array() - z).square() / variance;
+  const auto outputs = block_.outputs.col(sample.column).head(points()).array();
+  absorbed_.point_chi_squared.col(sample.channel).array() +=
+      (outputs - sample.value).square() / variance;
   ++absorbed_.samples;
 }
 
-// Adds what of the variance is the expansion's own error: `own_error` as it is discounted.
-void RegionalExpansion::AddOwnError(int channel, int column, double own_error, double variance) {
-  absorbed_.discount[channel] += own_error / variance;
-  absorbed_.own_error += block_.residual_variance[column] / variance + absorbed_.carried_rate;
+// Adds what of the variance is the expansion's own error.
+void RegionalExpansion::AddOwnError(const WeightedSample& sample) {
+  const double variance = sample.variance();
+  absorbed_.discount[sample.channel] += sample.own_error / variance;
+  absorbed_.own_error +=
+      block_.residual_variance[sample.column] / variance + absorbed_.carried_rate;
   absorbed_.carried_error += absorbed_.carried_rate;
 }
 
-// Adds to the normalization. `noise` is σ², `own_error` the residual's variance ρ, and `lack` the
-// part of the likelihood that the outlier's weight leaves out.
-void RegionalExpansion::Normalize(double noise, double own_error, double lack) {
-  absorbed_.log_noise += 0.5 * std::log(noise) + lack;
-  absorbed_.log_variance += 0.5 * std::log(noise + own_error) + lack;
+void RegionalExpansion::Normalize(const WeightedSample& sample) {
+  const double noise = VarianceFactor(sample.outliers) * sample.sigma * sample.sigma;
+  absorbed_.log_noise += 0.5 * std::log(noise) + sample.lack;
+  absorbed_.log_variance += 0.5 * std::log(noise + sample.own_error) + sample.lack;
 }
 
 // Ends the run summed so far. The differences get its last u, as they got its first: every u² of an
@@ -238,15 +230,15 @@ void RegionalExpansion::EndRunOfSums() {
 }
 
 // Adds u_k − u_{k−1} with u = e/√R, for the residuals' lag-1 correlation.
-void RegionalExpansion::AddDifference(int channel, const ConstVectorRef& coefficients, double error,
-                                      double variance) {
-  const double unit = 1 / std::sqrt(variance);
-  auto previous = absorbed_.previous_coefficients.col(channel);
-  difference_ = unit * coefficients - previous;
-  absorbed_.sums[static_cast<size_t>(channel)].differences.Add(
-      difference_, unit * error - absorbed_.previous_error[channel], 1);
-  previous = unit * coefficients;
-  absorbed_.previous_error[channel] = unit * error;
+void RegionalExpansion::AddDifference(const WeightedSample& sample, double error) {
+  const double unit = 1 / std::sqrt(sample.variance());
+  auto previous = absorbed_.previous_coefficients.col(sample.channel);
+  difference_ = unit * CoefficientsOf(sample) - previous;
+  double& previous_error = absorbed_.previous_error[sample.channel];
+  absorbed_.sums[static_cast<size_t>(sample.channel)].differences.Add(
+      difference_, unit * error - previous_error, 1);
+  previous = unit * CoefficientsOf(sample);
+  previous_error = unit * error;
 }
 
 double RegionalExpansion::RoundingError() const {

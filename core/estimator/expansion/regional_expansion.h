@@ -30,6 +30,7 @@
 #include "core/estimator/expansion/expansion_design.h"
 #include "core/estimator/expansion/fitted_block.h"
 #include "core/estimator/expansion/fitted_trajectories.h"
+#include "core/estimator/expansion/weighted_sample.h"
 #include "core/estimator/record/data_facts.h"
 #include "core/estimator/record/learned_noise.h"
 #include "polyest/samples.h"
@@ -115,10 +116,8 @@ class RegionalExpansion {
   const AbsorbedRows& absorbed() const { return absorbed_; }
   // Returns the number of a channel's samples lost to the expansion's own error.
   double Discount(int channel) const { return absorbed_.discount[channel]; }
-  // Returns the sum of the squares of the expansion's own error in units of the noise, Σ ρ_k/R_k.
-  double OwnError() const { return absorbed_.few ? absorbed_.few->own_error : absorbed_.own_error; }
-  // Returns the part of OwnError() that the check points' own trajectories do not show, because it
-  // was taken over from an expansion over another region.
+  // Returns the part of absorbed().OwnError() that the check points' own trajectories do not show,
+  // because it was taken over from an expansion over another region.
   double CarriedError() const { return absorbed_.carried_error; }
   // Returns the rounding error of the sums' χ², ε Σ e²/R with the errors e at the reference: of a
   // posterior far from it, little is left of their squares (bayes/mismatch_sums.h).
@@ -146,24 +145,6 @@ class RegionalExpansion {
   const OutlierDensity* DensityOfWeighted(int channel) const;
   // Returns the point at which outliers are judged, η.
   Vector CentreOfWeights() const;
-  // Returns the samples of a channel with outliers while they are kept; null without any.
-  const RobustSamples* KeptSamples(int channel) const;
-  // Returns the samples of a channel of relative noise while they are kept; null without any.
-  const RelativeSamples* KeptRelative(int channel) const;
-  // Returns χ² of a channel's samples at d = φ(η) − φ(η_0), with the noise of the predictions there
-  // while they are kept.
-  double ChiSquaredAt(int channel, const ConstVectorRef& d) const;
-  // Returns the term that makes the costs of different expansions of the same record comparable,
-  // each with its own noise and outlier weights: Σ ½ log R_k, and what the reweighting leaves out
-  // of the likelihood. R is taken with the expansion's own error, as in the sums, or without it.
-  double LogNormalization(bool with_own_error) const {
-    if (!absorbed_.few) return with_own_error ? absorbed_.log_variance : absorbed_.log_noise;
-    return with_own_error ? absorbed_.few->log_variance : absorbed_.few->log_noise;
-  }
-  // Returns χ² of the model itself at the collocation points, Q × m: what the sums say of the
-  // expansion there, or what has the same likelihood as samples that are kept. Not finite where a
-  // trajectory could not be integrated.
-  Matrix PointChiSquared() const;
   // Returns the cost on this expansion with α² = regularization and the likelihood to the power
   // 1/misfit.
   Cost MakeCost(double regularization) const;
@@ -201,45 +182,43 @@ class RegionalExpansion {
   void Linearize();
   void PredictNoise();
   bool IsScored(int channel) const;
-  bool IsTailed(int channel) const {
-    return problem_.problem().measured[static_cast<size_t>(channel)].noise.outliers !=
-           OutlierHandling::kNone;
-  }
-  ScoredSample Scored(int channel, const ConstVectorRef& coefficients, double z, double variance,
-                      double own_error) const;
-  double DeviationFromCentre(int channel, const ConstVectorRef& coefficients, double z,
-                             double variance) const;
-  void CountOutlier(int channel, const ConstVectorRef& coefficients, double z, double variance,
-                    double deviation);
-  void AddToDensity(int channel, const ConstVectorRef& coefficients, double z, double noise,
-                    double own_error, double variance, double lack);
+  bool IsTailed(int channel) const { return ModelOf(channel).outliers != OutlierHandling::kNone; }
+  ScoredSample Scored(const WeightedSample& sample) const;
+  double DeviationFromCentre(const WeightedSample& sample) const;
+  void CountOutlier(const WeightedSample& sample);
+  void AddToDensity(const WeightedSample& sample);
 
   // Samples that are kept (few_samples.cc).
   void KeepFewSamples();
   bool IsKeptRelative(int channel) const;
-  Matrix WithLogVariances(Matrix chi_squared, const Matrix& log_variance) const;
-  void AddToFew(int row, int channel, double z, double noise, double lack);
-  void AddRelative(int row, int channel);
-  void AddRobust(int channel, int column, double z, double noise, double lack);
+  void AddToFew(const WeightedSample& sample);
+  void AddRelative(const WeightedSample& sample);
+  void AddRobust(WeightedSample sample);
 
   // The sums of the samples, begun with those of ended runs (ended_runs_sums.cc).
   void BeginSums();
   void TakeEndedRuns();
   void EndRunOfSums();
-  // Adds the sample of a channel in the row, if there is one.
-  void AbsorbSample(int row, int channel);
-  void AddDifference(int channel, const ConstVectorRef& coefficients, double error,
-                     double variance);
-  void AddToBlocks(int channel, const ConstVectorRef& coefficients, double z, double variance);
-  void AddToProfile(int row, int channel, const ConstVectorRef& coefficients, double z,
-                    double variance);
-  void AddLogVariance(int column, double noise, double variance);
-  void AddOwnError(int channel, int column, double own_error, double variance);
-  void Normalize(double noise, double own_error, double lack);
+  // Returns the sample of a channel in the row with its weight. Adds one to what there is.
+  WeightedSample Weighted(int row, int channel) const;
+  void AbsorbSample(const WeightedSample& sample);
+  void AddDifference(const WeightedSample& sample, double error);
+  void AddToBlocks(const WeightedSample& sample);
+  void AddToProfile(const WeightedSample& sample);
+  void AddLogVariance(const WeightedSample& sample);
+  void AddOwnError(const WeightedSample& sample);
+  void Normalize(const WeightedSample& sample);
 
   // What check points and controls tell of the expansion's error (control_trajectories.cc).
-  void Compare(int column, double z, double variance);
-  void CompareControls(int column, double variance);
+  void Compare(const WeightedSample& sample);
+  void CompareControls(const WeightedSample& sample);
+
+  const NoiseModel& ModelOf(int channel) const {
+    return problem_.problem().measured[static_cast<size_t>(channel)].noise;
+  }
+  auto CoefficientsOf(const WeightedSample& sample) const {
+    return block_.coefficients.col(sample.column);
+  }
 
   const ResolvedProblem& problem_;
   ExpansionDesign design_;

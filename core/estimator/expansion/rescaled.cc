@@ -41,8 +41,8 @@ std::optional<Vector> VarianceFactors(const ResolvedProblem& problem,
     if (!DifferInScale(a, b)) return std::nullopt;
     factors[static_cast<Eigen::Index>(c)] = b.scale * b.scale / (a.scale * a.scale);
     if (a.scale == b.scale) continue;
-    const bool plain = b.learned && !present.KeptRelative(static_cast<int>(c)) && b.grid.empty() &&
-                       !problem.uses_filters() &&
+    const bool plain = b.learned && !present.absorbed().KeptRelative(static_cast<int>(c)) &&
+                       b.grid.empty() && !problem.uses_filters() &&
                        problem.problem().measured[c].noise.outliers == OutlierHandling::kNone;
     if (!plain) return std::nullopt;
   }
@@ -105,7 +105,7 @@ absl::StatusOr<std::unique_ptr<RegionalExpansion>> Rescaled(
   if (!factors) return InfeasibleError("more than scales of noise differs");
   ExpansionState state = *present.kept_state();
   if ((factors->array() != 1).any()) {
-    const double error = present.OwnError() / factors->minCoeff();
+    const double error = present.absorbed().OwnError() / factors->minCoeff();
     if (!(error <= max_shift * max_shift * noise.misfit)) {
       return InfeasibleError("the expansion is not accurate enough");
     }

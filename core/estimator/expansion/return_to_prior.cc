@@ -42,7 +42,7 @@ bool HasReturnedToPrior(const ResolvedProblem& problem, const ExpansionDesign& d
   return design.whole_prior && design.basis->order() > first.order;
 }
 
-bool MayReturnToPrior(const RegionalExpansion& present, const SettlementRequest& request) {
+bool MayReturnToPrior(const RegionalExpansion& present, const ReexpansionRequest& request) {
   const ResolvedProblem& problem = *request.problem;
   if (problem.dimension() <= kFewDimensions || problem.problem().expansion.order) return false;
   if (!request.may_raise_order || !request.may_replay) return false;
@@ -55,9 +55,9 @@ bool MayReturnToPrior(const RegionalExpansion& present, const SettlementRequest&
 }
 
 absl::StatusOr<PriorReturn> ReturnToPrior(const RegionalExpansion& present,
-                                          const SettlementRequest& request, const Matrix& particles,
-                                          const Vector& costs, ReplayAllowance& allowance,
-                                          const Stop& stop) {
+                                          const ReexpansionRequest& request,
+                                          const Matrix& particles, const Vector& costs,
+                                          ReplayAllowance& allowance, const Stop& stop) {
   const ResolvedProblem& problem = *request.problem;
   const ExpansionOptions& options = problem.problem().expansion;
   const int n = problem.dimension();

@@ -11,7 +11,7 @@
 // wide as the prior in some directions, or thin and bent as that of a sum of parameters, they often
 // follow the model better by orders of magnitude than polynomials of the same order over the box.
 //
-// So where a settlement in more than kFewDimensions has no other way to an accurate expansion, it
+// So where a re-expansion in more than kFewDimensions has no other way to an accurate expansion, it
 // tries the whole prior at rising orders, with check points drawn from the posterior. These are
 // the judges: the first order is taken that they call good, or else the best one if it is at least
 // twice as good as the present expansion. An expansion that has returned moves to a region again
@@ -39,7 +39,7 @@ bool HasReturnedToPrior(const ResolvedProblem& problem, const ExpansionDesign& d
 
 // Whether the expansion is too inaccurate at its check points and may return to the prior, or, over
 // the prior already, may be made again with check points where the posterior is now.
-bool MayReturnToPrior(const RegionalExpansion& present, const SettlementRequest& request);
+bool MayReturnToPrior(const RegionalExpansion& present, const ReexpansionRequest& request);
 
 struct PriorReturn {
   std::unique_ptr<RegionalExpansion> expansion;  // null if none is clearly better
@@ -51,8 +51,8 @@ struct PriorReturn {
 // the allowance up by the record. Returns an error on a stop request or when the store cannot be
 // read.
 absl::StatusOr<PriorReturn> ReturnToPrior(const RegionalExpansion& present,
-                                          const SettlementRequest& request, const Matrix& particles,
-                                          const Vector& costs, ReplayAllowance& allowance,
-                                          const Stop& stop);
+                                          const ReexpansionRequest& request,
+                                          const Matrix& particles, const Vector& costs,
+                                          ReplayAllowance& allowance, const Stop& stop);
 
 }  // namespace polyest::internal

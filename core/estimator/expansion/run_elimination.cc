@@ -143,7 +143,7 @@ absl::Status Elimination::Expand(const RunPath& path, const SampleStore& store, 
 }
 
 bool Elimination::RaiseOrder() {
-  if (!problem_.population() || !(expansion_->OwnError() > kMaxOwnError)) return false;
+  if (!problem_.population() || !(expansion_->absorbed().OwnError() > kMaxOwnError)) return false;
   const auto next = NextTruncation(problem_.problem().expansion, problem_.dimension(), truncation_);
   if (!next) return false;
   truncation_ = *next;
@@ -366,7 +366,8 @@ absl::Status Elimination::AddTo(const RunPath& path, const Stop& stop, EndedRuns
                          end_s_);
   } else {
     TellPopulation(problem_, cost, path, *score_, ended);
-    if (expansion_->OwnError() > kMaxOwnError) ended.unresolved += expansion_->OwnError();
+    if (expansion_->absorbed().OwnError() > kMaxOwnError)
+      ended.unresolved += expansion_->absorbed().OwnError();
     if (!IsScoreWithinRegion()) ended.unresolved += 1;
   }
   return absl::OkStatus();

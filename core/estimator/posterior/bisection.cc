@@ -69,7 +69,7 @@ Matrix ParticlesIn(const Element& element, const Matrix& particles) {
 
 bool HasTermsOfTheModel(const RegionalExpansion& expansion) {
   const Vector weights = expansion.TermWeights();
-  return expansion.OwnError() <= kUnexplained * weights.tail(weights.size() - 1).sum();
+  return expansion.absorbed().OwnError() <= kUnexplained * weights.tail(weights.size() - 1).sum();
 }
 
 std::vector<Piece> Bisect(const RegionalExpansion& expansion, std::optional<Eigen::Index> germ,

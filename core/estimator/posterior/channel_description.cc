@@ -31,7 +31,8 @@ double MeanChiSquared(const Cost& cost, const RegionalExpansion& expansion, int 
   for (Eigen::Index i = 0; i < posterior.scores.rows(); i += stride) {
     const Vector xi = cost.prior().OfScores(posterior.scores.row(i).transpose());
     const double weight = posterior.weights[i];
-    sum += weight * expansion.ChiSquaredAt(c, cost.BasisDifference(cost.region().ToLocal(xi)));
+    sum += weight *
+           expansion.absorbed().ChiSquaredAt(c, cost.BasisDifference(cost.region().ToLocal(xi)));
     weights += weight;
   }
   return sum / weights;
@@ -69,7 +70,7 @@ struct Outliers {
 // their weights. `chi_squared` is that of the sums at d, for the noise as it is taken to be.
 Outliers OutliersAt(const RegionalExpansion& expansion, OutlierHandling handling, const Vector& d,
                     int c, double chi_squared) {
-  if (const RobustSamples* kept = expansion.KeptSamples(c)) {
+  if (const RobustSamples* kept = expansion.absorbed().KeptSamples(c)) {
     const RobustSamples::Judgement judged = kept->JudgedAt(d);
     const double unit = VarianceFactor(handling);
     return {judged.outliers, judged.chi_squared / unit, judged.of_outliers / unit};
@@ -119,8 +120,9 @@ void DescribeChannel(const AssessmentRequest& request, const Cost& cost, const V
       fitted * samples / static_cast<double>(request.record->samples()) + sums.spent;
   const OutlierHandling handling =
       request.problem->problem().measured[static_cast<size_t>(c)].noise.outliers;
-  const Outliers outliers = OutliersAt(*request.expansion, handling, d, c,
-                                       request.expansion->ChiSquaredAt(c, d) / mean_square);
+  const Outliers outliers =
+      OutliersAt(*request.expansion, handling, d, c,
+                 request.expansion->absorbed().ChiSquaredAt(c, d) / mean_square);
   channel.chi_squared = JudgedChiSquared(request, c, outliers, share);
   channel.lag1_correlation = lag1.Of(c);
   DescribeSums(request, eta, d, c, channel);

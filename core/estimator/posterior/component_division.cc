@@ -135,7 +135,7 @@ absl::StatusOr<std::unique_ptr<MixtureComponent>> MixtureComponent::Unite(const 
   if (!begun.ok() && !IsInfeasible(begun)) return begun;
   allowance_.Use(taken_, taken_);
   if (!begun.ok()) return nullptr;
-  united->schedule_.MayDivideAgain();
+  united->schedule_.AllowDivision();
   united->bisected_ = false;
   const Cost cost = united->expansion_->MakeCost(problem_.problem().regularization);
   if (!(LargestShift(*united->expansion_, cost.power()) <= kMinShiftToBisect)) return nullptr;
@@ -174,7 +174,7 @@ absl::Status MixtureComponent::ExpandOn(const MixtureComponent& parent, const Pi
   taken_ = parent.taken_;
   schedule_ = parent.schedule_.OfPart(taken_);
   summary_ = parent.summary_;
-  settlements_ = parent.settlements_;
+  reexpansions_tried_ = parent.reexpansions_tried_;
   bisected_ = parent.bisected_ || parent.halves_;
   tempered_ = parent.tempered_;
   postponed_ = parent.postponed_;
@@ -197,7 +197,7 @@ absl::Status MixtureComponent::BeginOn(const MixtureComponent& parent, const Pie
                                        const Stop& stop) {
   POLYEST_RETURN_IF_ERROR(ExpandOn(parent, piece, stop));
   bool moved = !parent.halves_;
-  for (int i = 0; moved && !must_divide() && i < SettlementSchedule::kMaxSettlementsAtRow; ++i) {
+  for (int i = 0; moved && !must_divide() && i < ReexpansionSchedule::kMaxAttemptsAtRow; ++i) {
     POLYEST_ASSIGN_OR_RETURN(moved, MoveToPosterior(stop, /*may_raise_order=*/true));
   }
   return absl::OkStatus();

@@ -25,7 +25,7 @@ bool IsSummaryFor(const ResolvedProblem& problem, const RecordSummary& summary, 
          beginning.noise.size() == beginning.rows.size() * m;
 }
 
-bool IsMemoryFor(const ResolvedProblem& problem, const SettlementMemory& memory,
+bool IsMemoryFor(const ResolvedProblem& problem, const ReexpansionMemory& memory,
                  const Matrix& particles, int64_t rows) {
   const PriorTried& prior = memory.prior;
   if (std::min(prior.stays_from, prior.tried) < 0) return false;
@@ -46,7 +46,7 @@ bool IsMemoryFor(const ResolvedProblem& problem, const SettlementMemory& memory,
 
 bool IsStateFor(const ResolvedProblem& problem, const ComponentState& state) {
   return state.taken > 0 && problem.first_row() <= state.taken &&
-         SettlementSchedule::IsState(state.schedule, state.taken) &&
+         ReexpansionSchedule::IsState(state.schedule, state.taken) &&
          state.expansion.absorbed.rows == state.taken &&
          state.particles.cols() == problem.dimension() && state.particles.allFinite() &&
          IsMemoryFor(problem, state.memory, state.particles, state.taken) && state.weight >= 0 &&
@@ -125,7 +125,7 @@ ComponentState MixtureComponent::State() const {
   state.bisected = bisected_;
   state.taken = taken_;
   state.schedule = schedule_.state();
-  state.settlements = settlements_;
+  state.reexpansions_tried = reexpansions_tried_;
   state.reexpansions = reexpansions_;
   state.abandoned_rows = abandoned_rows_;
   state.allowance = allowance_.state();
@@ -157,7 +157,7 @@ absl::StatusOr<std::unique_ptr<MixtureComponent>> MixtureComponent::FromState(
   component->bisected_ = state.bisected;
   component->taken_ = state.taken;
   component->schedule_.Restore(state.schedule);
-  component->settlements_ = state.settlements;
+  component->reexpansions_tried_ = state.reexpansions_tried;
   component->reexpansions_ = state.reexpansions;
   component->abandoned_rows_ = state.abandoned_rows;
   component->allowance_.Restore(state.allowance);

@@ -7,9 +7,9 @@
 #include <optional>
 
 #include "core/estimator/expansion/expansion_state.h"
+#include "core/estimator/expansion/reexpansion_memory.h"
 #include "core/estimator/expansion/replay_allowance.h"
-#include "core/estimator/expansion/settlement_memory.h"
-#include "core/estimator/posterior/settlement_schedule.h"
+#include "core/estimator/posterior/reexpansion_schedule.h"
 #include "core/estimator/record/record_summary.h"
 
 namespace polyest::internal {
@@ -20,13 +20,13 @@ struct ComponentState {
   double relative_tolerance = 0;  // of the problem's integrators; it follows the noise
   ExpansionState expansion;
   Matrix particles;
-  SettlementMemory memory;
+  ReexpansionMemory memory;
   double weight = 1;
   int room = 1;
   bool bisected = false;
   int64_t taken = 0;
-  SettlementSchedule::State schedule;
-  uint64_t settlements = 0;
+  ReexpansionSchedule::State schedule;
+  uint64_t reexpansions_tried = 0;
   int reexpansions = 0;
   int64_t abandoned_rows = 0;
   ReplayAllowance::State allowance;

@@ -58,7 +58,7 @@ double LeftOfQuadratic(const Vector& values) {
 double LeftOfLines(const RegionalExpansion& lines, Eigen::Index germ) {
   std::vector<bool> kept(static_cast<size_t>(lines.points()), false);
   for (const int point : lines.kept_points()) kept[static_cast<size_t>(point)] = true;
-  const Matrix chi_squared = lines.PointChiSquared();
+  const Matrix chi_squared = lines.absorbed().PointChiSquared();
   double left = 0;
   for (Eigen::Index line = 0; line < kLines; ++line) {
     const Eigen::Index first = (germ * kLines + line) * kPointsOfLine;

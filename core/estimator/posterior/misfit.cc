@@ -72,7 +72,8 @@ MisfitFound FindMisfit(const ResolvedProblem& problem, const RegionalExpansion& 
   const Vector d = cost.BasisDifference(minimum.point);
   double chi_squared = 0;
   for (size_t c = 0; c < expansion.sums().size(); ++c) {
-    if (IsTested(problem, c)) chi_squared += expansion.ChiSquaredAt(static_cast<int>(c), d);
+    if (IsTested(problem, c))
+      chi_squared += expansion.absorbed().ChiSquaredAt(static_cast<int>(c), d);
   }
   const double excess = chi_squared - degrees;
   if (!(excess > kDeviations * std::sqrt(2 * degrees))) return {};

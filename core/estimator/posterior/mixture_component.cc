@@ -24,8 +24,8 @@ constexpr int64_t kBlockRows = 64;
 // while the record doubles, and most of it is in the last states.
 constexpr double kAheadOfNeed = 0.004;
 
-// Returns the first of the thousand seeds that a settlement may use.
-uint64_t SeedOfSettlement(uint64_t settlements) { return 1000 * (settlements + 1); }
+// Returns the first of the thousand seeds that a re-expansion may use.
+uint64_t SeedOfReexpansion(uint64_t tried) { return 1000 * (tried + 1); }
 
 }  // namespace
 
@@ -143,7 +143,7 @@ absl::StatusOr<bool> MixtureComponent::AbsorbBlock(const RowBlock& block, const 
     if (raised) return false;
     const bool short_of_trajectories = row == expansion_->fitted_rows();
     bool too_coarse = false;
-    const bool coarse = !short_of_trajectories && !schedule_.IsPatient(taken_) &&
+    const bool coarse = !short_of_trajectories && !schedule_.ToleratesResiduals(taken_) &&
                         expansion_->ResidualToNoise(row) > CoarseResidual();
     if (short_of_trajectories || (adaptive() && coarse)) {
       POLYEST_ASSIGN_OR_RETURN(const bool moved, RefineBefore(row, stop));
@@ -178,17 +178,17 @@ absl::StatusOr<bool> MixtureComponent::FinishRow(const Stop& stop) {
   } else if (LooksAhead()) {
     POLYEST_ASSIGN_OR_RETURN(settled, MoveAheadOfNeed(stop));
   }
-  schedule_.RowSeen(taken_);
+  schedule_.EndRow(taken_);
   return moved || settled;
 }
 
 // Handles a next row at which the present expansion is too coarse or too few trajectories are left.
 absl::StatusOr<bool> MixtureComponent::RefineBefore(int row, const Stop& stop) {
   const bool short_of_trajectories = row == expansion_->fitted_rows();
-  const bool may_settle = schedule_.MaySettleBefore(taken_);
+  const bool may_reexpand = schedule_.MayReexpandBefore(taken_);
   // There is no expansion to stay with.
   if (short_of_trajectories) allowance_.ExemptAt(taken_);
-  if (adaptive() && taken_ > 0 && may_settle) {
+  if (adaptive() && taken_ > 0 && may_reexpand) {
     POLYEST_ASSIGN_OR_RETURN(const bool moved, MoveToPosterior(stop, !short_of_trajectories));
     schedule_.CountAttempt();
     if (moved) return true;
@@ -201,7 +201,7 @@ absl::StatusOr<bool> MixtureComponent::RefineBefore(int row, const Stop& stop) {
     return expansion_->shortage();
   }
   if (MayBisect()) return false;
-  schedule_.BePatient(taken_);
+  schedule_.TolerateResiduals(taken_);
   return false;
 }
 
@@ -240,7 +240,7 @@ absl::StatusOr<bool> MixtureComponent::MoveIfLeaning(const Stop& stop) {
   if (Leans()) {
     POLYEST_ASSIGN_OR_RETURN(settled, MoveToPosterior(stop, /*may_raise_order=*/false));
   }
-  schedule_.EdgesSeen(taken_);
+  schedule_.PutOffEdges(taken_);
   return settled;
 }
 
@@ -259,23 +259,16 @@ absl::StatusOr<bool> MixtureComponent::MoveAheadOfNeed(const Stop& stop) {
   const double shift = LargestShift(*expansion_, cost.power());
   const bool is_short = taken_ <= RowsOfShortRecord(problem_);
   const bool may_carry = shift <= kMaxCarriedShift || is_short || IsReplayWithheld();
-  if (shift < kAheadOfNeed * kMaxCarriedShift || !may_carry) {
-    schedule_.LookedAhead(taken_);
-    return false;
-  }
+  if (shift < kAheadOfNeed * kMaxCarriedShift || !may_carry) return false;
   POLYEST_ASSIGN_OR_RETURN(const bool settled, MoveToPosterior(stop, /*may_raise_order=*/false,
                                                                /*may_replay=*/is_short));
-  if (settled) {
-    schedule_.LookedAhead(taken_);
-  } else {
-    schedule_.MovedAheadInVain(taken_);
-  }
+  if (!settled) schedule_.PutOffLookAhead(taken_);
   return settled;
 }
 
 absl::StatusOr<bool> MixtureComponent::RestoreAccuracy(const Stop& stop) {
   POLYEST_ASSIGN_OR_RETURN(const bool moved, MoveWhileInaccurate(stop));
-  row_end_.settlements = 0;
+  row_end_.moves = 0;
   return moved;
 }
 
@@ -285,34 +278,34 @@ absl::StatusOr<bool> MixtureComponent::MoveWhileInaccurate(const Stop& stop) {
     return BelievedShift(*expansion_, cost, bisected_);
   };
   const auto accurate = [&] { return shift() <= kAccurateShift; };
-  // Each settlement may raise the order, so several may be needed.
-  for (; row_end_.settlements < (automatic_order() ? SettlementSchedule::kMaxSettlementsAtRow : 1);
-       ++row_end_.settlements) {
+  // Each re-expansion may raise the order, so several may be needed.
+  for (; row_end_.moves < (automatic_order() ? ReexpansionSchedule::kMaxAttemptsAtRow : 1);
+       ++row_end_.moves) {
     const bool follows = accurate();
     if (follows && !Leans()) {
       postponed_.expansion = 0;
-      return row_end_.settlements > 0;
+      return row_end_.moves > 0;
     }
     POLYEST_ASSIGN_OR_RETURN(const bool settled,
                              MoveToPosterior(stop, /*may_raise_order=*/!follows));
     if (must_divide()) return true;
     if (!settled) break;
   }
-  const bool moved = row_end_.settlements > 0;
+  const bool moved = row_end_.moves > 0;
   if (accurate()) return moved;
   if (LookForPieces()) return true;
   const bool waits = moved && problem_.dimension() >= kDimensionToMoveFirst;
   return (!waits && shift() > kMinShiftToBisect && BisectElement()) || moved;
 }
 
-SettlementRequest MixtureComponent::RequestSettlement() const {
-  SettlementRequest request;
+ReexpansionRequest MixtureComponent::RequestReexpansion() const {
+  ReexpansionRequest request;
   request.problem = &problem_;
   request.store = store_;
   request.rows = taken_;
   request.guesses = particles_;
   request.memory = memory_;
-  request.seed = SeedOfSettlement(settlements_);
+  request.seed = SeedOfReexpansion(reexpansions_tried_);
   request.threads = threads_;
   request.allowance = allowance_;
   return request;
@@ -324,35 +317,35 @@ SettlementRequest MixtureComponent::RequestSettlement() const {
 // is found to be due again.
 absl::StatusOr<bool> MixtureComponent::MoveToPosterior(const Stop& stop, bool may_raise_order,
                                                        bool may_replay) {
-  SettlementRequest request = RequestSettlement();
+  ReexpansionRequest request = RequestReexpansion();
   request.may_replay = may_replay;
   request.may_raise_order = may_raise_order && !bisected_;
   request.ends_at_overlooked = MayLookForPieces();
-  POLYEST_ASSIGN_OR_RETURN(Settlement settlement, MakeSettlement(*expansion_, request, stop));
-  if (!settlement.overlooked || !request.ends_at_overlooked) return Take(std::move(settlement));
-  const RegionalExpansion& shown = settlement.expansion ? *settlement.expansion : *expansion_;
-  if (!DivideIntoPieces(shown, settlement.particles)) {
+  POLYEST_ASSIGN_OR_RETURN(Reexpansion found, Reexpand(*expansion_, request, stop));
+  if (!found.overlooked || !request.ends_at_overlooked) return Take(std::move(found));
+  const RegionalExpansion& shown = found.moves.expansion ? *found.moves.expansion : *expansion_;
+  if (!DivideIntoPieces(shown, found.particles)) {
     request.ends_at_overlooked = false;
-    request.seed = SeedOfSettlement(settlements_ + 1);
-    POLYEST_ASSIGN_OR_RETURN(settlement, ContinueSettlement(*expansion_, std::move(settlement),
-                                                            std::move(request), stop));
-    ++settlements_;
+    request.seed = SeedOfReexpansion(reexpansions_tried_ + 1);
+    POLYEST_ASSIGN_OR_RETURN(
+        found, ContinueReexpansion(*expansion_, std::move(found), std::move(request), stop));
+    ++reexpansions_tried_;
   }
-  return Take(std::move(settlement)) || must_divide();
+  return Take(std::move(found)) || must_divide();
 }
 
-// Adopts what a settlement has found. Returns whether the expansion has moved.
-bool MixtureComponent::Take(Settlement settlement) {
-  ++settlements_;
-  particles_ = std::move(settlement.particles);
-  memory_ = std::move(settlement.memory);
-  abandoned_rows_ += settlement.propagated_rows;
-  reexpansions_ += settlement.reexpansions;
-  allowance_ = settlement.allowance;
-  const bool moved = settlement.expansion != nullptr;
-  if (moved && !settlement.postponed) postponed_.expansion = 0;
-  if (settlement.postponed && postponed_.expansion == 0) postponed_.expansion = taken_;
-  if (moved) Adopt(std::move(settlement.expansion));
+// Adopts what a re-expansion has found. Returns whether the expansion has moved.
+bool MixtureComponent::Take(Reexpansion found) {
+  ++reexpansions_tried_;
+  particles_ = std::move(found.particles);
+  memory_ = std::move(found.memory);
+  abandoned_rows_ += found.moves.propagated_rows;
+  reexpansions_ += found.moves.reexpansions;
+  allowance_ = found.moves.allowance;
+  const bool moved = found.moves.expansion != nullptr;
+  if (moved && !found.moves.postponed) postponed_.expansion = 0;
+  if (found.moves.postponed && postponed_.expansion == 0) postponed_.expansion = taken_;
+  if (moved) Adopt(std::move(found.moves.expansion));
   return moved;
 }
 
@@ -361,10 +354,10 @@ absl::Status MixtureComponent::MakeComparable(const Stop& stop) {
   POLYEST_RETURN_IF_ERROR(Recover(stop));
   const Cost cost = expansion_->MakeCost(problem_.problem().regularization);
   if (!AgreementWithModel(*expansion_, cost).mean_difference) {
-    SettlementRequest request = RequestSettlement();
+    ReexpansionRequest request = RequestReexpansion();
     request.may_raise_order = false;
-    POLYEST_ASSIGN_OR_RETURN(Settlement settlement, MakeSettlement(*expansion_, request, stop));
-    Take(std::move(settlement));
+    POLYEST_ASSIGN_OR_RETURN(Reexpansion found, Reexpand(*expansion_, request, stop));
+    Take(std::move(found));
   }
   schedule_.SetComparable(taken_);
   return absl::OkStatus();

@@ -1,7 +1,7 @@
 #pragma once
 
 // One component of the posterior's mixture, which advances along the record. It has an expansion
-// over its own region, and its own windows, settlements, noise and tolerance. Its results are a
+// over its own region, and its own windows, re-expansions, noise and tolerance. Its results are a
 // function of the rows taken, regardless of the batches in which they arrived.
 
 #include <absl/status/status.h>
@@ -13,13 +13,12 @@
 
 #include "core/estimator/expansion/germ_summary.h"
 #include "core/estimator/expansion/reexpansion.h"
+#include "core/estimator/expansion/reexpansion_memory.h"
 #include "core/estimator/expansion/regional_expansion.h"
 #include "core/estimator/expansion/replay_allowance.h"
-#include "core/estimator/expansion/run_elimination.h"
-#include "core/estimator/expansion/settlement_memory.h"
 #include "core/estimator/posterior/assessment.h"
 #include "core/estimator/posterior/posterior_pieces.h"
-#include "core/estimator/posterior/settlement_schedule.h"
+#include "core/estimator/posterior/reexpansion_schedule.h"
 #include "core/estimator/record/record_summary.h"
 
 namespace polyest::internal {
@@ -119,7 +118,7 @@ class MixtureComponent {
   bool IsReplayWithheld() const { return !allowance_.AllowsRecord(taken_); }
 
   // The progress of what is due after the last row taken. It outlives a stop, so that the work goes
-  // on where it was left: a settlement made once more would change the estimate.
+  // on where it was left: a re-expansion made once more would change the estimate.
   struct RowEnd {
     int reweighed = 0;                   // times that the noise was revised
     bool settles = false;                // whether the expansion must still follow the last time
@@ -127,7 +126,7 @@ class MixtureComponent {
     int revisions = 0;                   // of the misfit
     std::optional<double> revised_from;  // misfit before the present one
     std::optional<bool> goes_on;         // what ReviseMisfit has returned
-    int settlements = 0;                 // of RestoreAccuracy that have moved the expansion
+    int moves = 0;                       // of the expansion, by RestoreAccuracy
     bool moved = false;                  // whether MoveWithMisfit has moved the expansion
   };
 
@@ -149,8 +148,8 @@ class MixtureComponent {
   absl::StatusOr<bool> MoveWhileInaccurate(const Stop& stop);
   absl::StatusOr<bool> MoveToPosterior(const Stop& stop, bool may_raise_order,
                                        bool may_replay = true);
-  SettlementRequest RequestSettlement() const;
-  bool Take(Settlement settlement);
+  ReexpansionRequest RequestReexpansion() const;
+  bool Take(Reexpansion found);
   void Adopt(std::unique_ptr<RegionalExpansion> expansion);
 
   // Noise, misfit and the integrators' tolerance (component_noise.cc).
@@ -179,11 +178,6 @@ class MixtureComponent {
                         Matrix particles, const Stop& stop);
   absl::Status GoOnWith(ResolvedProblem next, const GermSummary& shared, const Stop& stop);
   absl::StatusOr<Matrix> ParticlesNow(const Stop& stop) const;
-  std::optional<GermSummary> GaussianPosterior(const Stop& stop) const;
-  absl::StatusOr<int64_t> EliminateLast(const GermSummary& posterior, const Stop& stop,
-                                        EndedRuns& ended) const;
-  absl::StatusOr<int64_t> EliminateAll(const Matrix& particles, int64_t rows, const Stop& stop,
-                                       EndedRuns& ended) const;
   absl::Status RenewEndedRuns(const Stop& stop);
 
   // Division into pieces of the posterior or halves of the element (component_division.cc).
@@ -204,8 +198,8 @@ class MixtureComponent {
   bool learns_noise_;
   std::unique_ptr<RegionalExpansion> expansion_;
   bool broken_ = false;               // whether a stop left the expansion between two rows
-  Matrix particles_;                  // of the last settlement, germ coordinates
-  SettlementMemory memory_;           // and what they and earlier ones have found
+  Matrix particles_;                  // of the last re-expansion, germ coordinates
+  ReexpansionMemory memory_;          // and what they and earlier ones have found
   std::vector<Piece> pieces_;         // those to divide into; halves are found by Divide
   bool last_row_too_coarse_ = false;  // whether the last row was too coarse and not dealt with yet
   bool halves_ = false;               // whether to divide into the halves of a bisection
@@ -215,10 +209,10 @@ class MixtureComponent {
   int room_ = 1;
   double weight_ = 1;
   int64_t taken_ = 0;
-  SettlementSchedule schedule_;
+  ReexpansionSchedule schedule_;
   TemperedBeginning tempered_;  // what is left of it
   RowEnd row_end_;
-  uint64_t settlements_ = 0;
+  uint64_t reexpansions_tried_ = 0;
   int reexpansions_ = 0;
   int64_t abandoned_rows_ = 0;  // propagated by expansions that were replaced
   ReplayAllowance allowance_;   // of rows that are propagated again

@@ -10,8 +10,10 @@ namespace polyest::internal {
 
 double HeightOf(const RegionalExpansion& expansion, const Cost& cost) {
   const Agreement agreement = AgreementWithModel(expansion, cost);
-  if (!agreement.mean_difference) return expansion.LogNormalization(/*with_own_error=*/true);
-  return *agreement.mean_difference + expansion.LogNormalization(/*with_own_error=*/false);
+  if (!agreement.mean_difference)
+    return expansion.absorbed().LogNormalization(/*with_own_error=*/true);
+  return *agreement.mean_difference +
+         expansion.absorbed().LogNormalization(/*with_own_error=*/false);
 }
 
 MixtureShare ShareOf(const RegionalExpansion& expansion, const Cost& cost,

@@ -161,7 +161,7 @@ class Revision {
     if (discount > kMaxDiscount * sums.Degrees()) return;
     const double spent = sums.surplus + discount;
     const double degrees = std::max(1.0, sums.Degrees() - spent - share);
-    const double chi_squared = std::max(0.0, expansion_.ChiSquaredAt(c, d_) - spent);
+    const double chi_squared = std::max(0.0, expansion_.absorbed().ChiSquaredAt(c, d_) - spent);
     const bool weighted = IsWeighted(c);
     const double power = weighted ? kPowerWithOutliers : kPower;
     const double factor = std::clamp(std::pow(chi_squared / degrees, power), kMaxFall, kMaxRise);
@@ -185,7 +185,8 @@ class Revision {
       const ChannelSums& sums = expansion_.sums()[static_cast<size_t>(c)];
       if (sums.samples.count() < MinSamplesForNoise(problem_)) return;
       if (expansion_.Discount(c) > kMaxDiscountOfPrediction * sums.Degrees()) return;
-      if (!model.unknown && expansion_.ChiSquaredAt(c, d_) > kMaxMisfit * sums.Degrees()) return;
+      if (!model.unknown && expansion_.absorbed().ChiSquaredAt(c, d_) > kMaxMisfit * sums.Degrees())
+        return;
     } else {
       const Vector moved = eta_ - expansion_.LinearizedAt();
       if (!(moved.dot(cost_.Hessian(eta_) * moved) > kMovedPrediction * kMovedPrediction)) return;

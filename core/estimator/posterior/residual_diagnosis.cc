@@ -146,7 +146,7 @@ std::string ReasonNotLearned(const Findings& findings, size_t c) {
   if (channel.samples == 0) return "";
   const ChannelNoise& noise = findings.expansion->noise().channels[c];
   const double relative = noise.scale * model.relative;
-  const bool kept = findings.expansion->KeptRelative(static_cast<int>(c)) != nullptr;
+  const bool kept = findings.expansion->absorbed().KeptRelative(static_cast<int>(c)) != nullptr;
   if (relative > kLargeRelativeNoise && !noise.of_prediction && !kept) {
     return absl::StrFormat(
         "its relative noise of %.3g %% is taken of the samples and not of the predictions, which "

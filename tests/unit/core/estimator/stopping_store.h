@@ -9,7 +9,7 @@
 namespace polyest::internal {
 
 // Requests a stop when it has been read a number of times. Work then stops wherever the estimator
-// looks next, in the middle of a block, a replay or a settlement.
+// looks next, in the middle of a block, a replay or a re-expansion.
 class StoppingStore final : public SampleStore {
  public:
   int64_t rows() const override { return samples_.rows(); }

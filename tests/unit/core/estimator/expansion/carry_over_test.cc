@@ -111,7 +111,9 @@ TEST_F(CarriedSums, AreThoseOfAReplayForPolynomialsOfTheUnknowns) {
   // An error of 1e-12 of each output, with 650 samples of a signal of 100 standard deviations,
   // changes χ² by less than 650 · 100² · 1e-12.
   EXPECT_LT((CostsOver(**carried) - expected).cwiseAbs().maxCoeff(), 1e-5);
-  EXPECT_LT(((*carried)->PointChiSquared() - replayed->PointChiSquared()).cwiseAbs().maxCoeff(),
+  EXPECT_LT(((*carried)->absorbed().PointChiSquared() - replayed->absorbed().PointChiSquared())
+                .cwiseAbs()
+                .maxCoeff(),
             1e-4);
   for (int c = 0; c < 2; ++c) {
     const ChannelSums &a = (*carried)->sums()[c], &b = replayed->sums()[c];
@@ -164,7 +166,7 @@ TEST_F(CarriedSums, AreRefusedWhereTheExpansionIsInaccurate) {
   block.noise.assign(samples.rows(), 0.02);
   Begin(problem, block);
   ASSERT_NE(present_->kept_state(), nullptr);
-  EXPECT_GT(present_->OwnError(), 1);
+  EXPECT_GT(present_->absorbed().OwnError(), 1);
   EXPECT_TRUE(absl::IsFailedPrecondition(Carried(DesignInside()).status()));
 }
 

@@ -1,6 +1,6 @@
-// Tests what settlements keep, by itself and by what an estimator no longer does again.
+// Tests what re-expansions keep, by itself and by what an estimator no longer does again.
 
-#include "core/estimator/expansion/settlement_memory.h"
+#include "core/estimator/expansion/reexpansion_memory.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <memory>
 
-#include "core/estimator/expansion/settlement_particles.h"
+#include "core/estimator/expansion/reexpansion_particles.h"
 #include "core/estimator/record/memory_store.h"
 #include "tests/unit/core/bayes/many_parameters.h"
 #include "tests/unit/core/estimator/text_problem.h"
@@ -36,11 +36,11 @@ Cost CostOfDatum(const Prior& prior, double z) {
 // The posterior N(0, 1/2) moves by d = 0.05 to N(0.05, 1/2): by 0.07 standard deviations. The
 // weights have the effective size exp(−d²/s²) = 0.995 of the number. The mean of 1000 draws moves
 // by d with the standard error d √(2/1000) of a covariance; resampling adds less than 6 s/1000.
-TEST(SettlementMemory, ReweighsParticlesOfAPosteriorThatHardlyMoved) {
+TEST(ReexpansionMemory, ReweighsParticlesOfAPosteriorThatHardlyMoved) {
   const Prior prior = ManyNormals(1);
   const ExpansionDesign design = StandardDesign();
   const Particles drawn =
-      SampleForSettlement(CostOfDatum(prior, 0), design, Matrix(0, 1), 1, Stop()).value();
+      SampleForReexpansion(CostOfDatum(prior, 0), design, Matrix(0, 1), 1, Stop()).value();
   const Matrix particles = design.region.ManyToGerm(drawn.etas);
   const Matrix now = Reweighted(particles, drawn.costs, CostOfDatum(prior, 0.1), design);
   ASSERT_EQ(now.rows(), particles.rows());
@@ -48,11 +48,11 @@ TEST(SettlementMemory, ReweighsParticlesOfAPosteriorThatHardlyMoved) {
 }
 
 // By 0.7 standard deviations: the effective size is exp(−1/2) = 0.61 of the number.
-TEST(SettlementMemory, NeedsNewParticlesOfAPosteriorThatMoved) {
+TEST(ReexpansionMemory, NeedsNewParticlesOfAPosteriorThatMoved) {
   const Prior prior = ManyNormals(1);
   const ExpansionDesign design = StandardDesign();
   const Particles drawn =
-      SampleForSettlement(CostOfDatum(prior, 0), design, Matrix(0, 1), 1, Stop()).value();
+      SampleForReexpansion(CostOfDatum(prior, 0), design, Matrix(0, 1), 1, Stop()).value();
   EXPECT_EQ(Reweighted(drawn.etas, drawn.costs, CostOfDatum(prior, 1), design).rows(), 0);
   EXPECT_EQ(Reweighted(drawn.etas, Vector(), CostOfDatum(prior, 0), design).rows(), 0);
 }
@@ -73,7 +73,7 @@ bool IsInVain(const Region& region, int64_t rows, double scale) {
   return IsRaisingInVain(tried, kAccepted, region, rows, NoiseOfScale(scale));
 }
 
-TEST(SettlementMemory, KnowsAnOrderInVainOverTheSameAndALargerRegion) {
+TEST(ReexpansionMemory, KnowsAnOrderInVainOverTheSameAndALargerRegion) {
   EXPECT_TRUE(IsInVain(Box(0, 1), kRows, 1));
   EXPECT_TRUE(IsInVain(Box(0, 2), kRows, 1));
   EXPECT_FALSE(IsInVain(Box(0, 0.5), kRows, 1));
@@ -81,7 +81,7 @@ TEST(SettlementMemory, KnowsAnOrderInVainOverTheSameAndALargerRegion) {
   EXPECT_FALSE(IsRaisingInVain(OrderInVain(), kAccepted, Box(0, 1), kRows, NoiseOfScale(1)));
 }
 
-TEST(SettlementMemory, ForgetsAnOrderInVainWhenTheRecordDoublesOrTheNoiseGrows) {
+TEST(ReexpansionMemory, ForgetsAnOrderInVainWhenTheRecordDoublesOrTheNoiseGrows) {
   EXPECT_TRUE(IsInVain(Box(0, 1), 2 * kRows - 1, 1));
   EXPECT_FALSE(IsInVain(Box(0, 1), 2 * kRows, 1));
   // An error of four times what is accepted is as large as that when the noise is twice as large.
@@ -140,7 +140,7 @@ HopelessRun RunHopelessly(int rows) {
 // too coarse, at a row r ≥ 1, and then no more than once while the record doubles: at most over
 // 2 (r + 2 r + … + N) < 4 N rows. As many are read again where the present block of rows is
 // propagated anew after an attempt, and each row once at least.
-TEST(SettlementMemory, HigherOrdersAreTriedInVainOnceWhileTheRecordDoubles) {
+TEST(ReexpansionMemory, HigherOrdersAreTriedInVainOnceWhileTheRecordDoubles) {
   constexpr int kHopelessRows = 60;
   const HopelessRun run = RunHopelessly(kHopelessRows);
   EXPECT_TRUE(Has(run.estimate, DiagnosticCode::kExpansionInaccurate));
@@ -149,7 +149,7 @@ TEST(SettlementMemory, HigherOrdersAreTriedInVainOnceWhileTheRecordDoubles) {
 
 // The trajectories of the estimate are all that were run: of the orders 5 and 7 with 252 and 792
 // terms, two points a term, at least over the first of two rows.
-TEST(SettlementMemory, TrajectoriesOfOrdersTriedInVainCount) {
+TEST(ReexpansionMemory, TrajectoriesOfOrdersTriedInVainCount) {
   EXPECT_GE(RunHopelessly(2).estimate.expansion.trajectories, (2 * 252 + 2 * 792) / 2);
 }
 

@@ -1,4 +1,4 @@
-#include "core/estimator/expansion/settlement_particles.h"
+#include "core/estimator/expansion/reexpansion_particles.h"
 
 #include <gtest/gtest.h>
 
@@ -27,12 +27,12 @@ ExpansionDesign DesignOf(const Prior& prior) {
 }
 
 Particles Sample(const Cost& cost, const ExpansionDesign& design, uint64_t seed) {
-  return SampleForSettlement(cost, design, Matrix(0, cost.dimension()), seed, Stop()).value();
+  return SampleForReexpansion(cost, design, Matrix(0, cost.dimension()), seed, Stop()).value();
 }
 
 // The data z_i of noise σ leave N(z_i, σ²) of uniform priors that are far wider. Four standard
 // errors of as many random draws as half the particles are allowed.
-TEST(SettlementParticles, HaveTheMomentsOfManyParameters) {
+TEST(ReexpansionParticles, HaveTheMomentsOfManyParameters) {
   const int n = 40;
   const double noise = 5e-4;
   const Vector z = Vector::LinSpaced(n, -0.9, 0.8);
@@ -47,7 +47,7 @@ TEST(SettlementParticles, HaveTheMomentsOfManyParameters) {
 }
 
 // Importance sampling evaluates the cost at far fewer points than tempering would.
-TEST(SettlementParticles, AreDrawnByImportanceSamplingFromAGaussian) {
+TEST(ReexpansionParticles, AreDrawnByImportanceSamplingFromAGaussian) {
   const Prior prior = ManyNormals(3);
   const ExpansionDesign design = DesignOf(prior);
   const Cost cost = CostOfEach(prior, Vector::Ones(3), 0.5);
@@ -66,7 +66,7 @@ TEST(SettlementParticles, AreDrawnByImportanceSamplingFromAGaussian) {
 
 // The first particles become check points, so they must be draws like any others. The first points
 // of a Halton sequence are not: each coordinate ascends.
-TEST(SettlementParticles, AreInRandomOrder) {
+TEST(ReexpansionParticles, AreInRandomOrder) {
   const Prior prior = ManyNormals(2);
   const ExpansionDesign design = DesignOf(prior);
   const Cost cost = CostOfEach(prior, Vector::Zero(2), 1);
@@ -79,7 +79,7 @@ TEST(SettlementParticles, AreInRandomOrder) {
 }
 
 // a² = 1 leaves a = ±1, which no single Gaussian approximates.
-TEST(SettlementParticles, AreDrawnByTemperingFromTwoPieces) {
+TEST(ReexpansionParticles, AreDrawnByTemperingFromTwoPieces) {
   const Prior prior = ManyNormals(2);
   const ExpansionDesign design = DesignOf(prior);
   const Cost cost = CostOf(prior, {{[](const Vector& xi) { return xi[0] * xi[0]; }, 1, 0.1}});
@@ -89,12 +89,13 @@ TEST(SettlementParticles, AreDrawnByTemperingFromTwoPieces) {
   EXPECT_NEAR(static_cast<double>(above), 500, 4 * std::sqrt(500.0));
 }
 
-TEST(SettlementParticles, AreCancelledByAStopRequest) {
+TEST(ReexpansionParticles, AreCancelledByAStopRequest) {
   std::stop_source source;
   source.request_stop();
   const Prior prior = ManyNormals(2);
-  const auto particles = SampleForSettlement(CostOfEach(prior, Vector::Zero(2), 1), DesignOf(prior),
-                                             Matrix(0, 2), 1, Stop(source.get_token()));
+  const auto particles =
+      SampleForReexpansion(CostOfEach(prior, Vector::Zero(2), 1), DesignOf(prior), Matrix(0, 2), 1,
+                           Stop(source.get_token()));
   EXPECT_EQ(particles.status().code(), absl::StatusCode::kCancelled);
 }
 

@@ -91,9 +91,12 @@ TEST_F(RescaledExpansion, IsThatOfAReplayWithTheOtherScale) {
   const auto replayed = Replayed(noise_);
   EXPECT_EQ((*rescaled)->propagated_rows() * 13, replayed->propagated_rows());  // 50 of 650 rows
   ExpectSameCosts(**rescaled, *replayed, 1e-9);
-  EXPECT_LT(((*rescaled)->PointChiSquared() - replayed->PointChiSquared()).cwiseAbs().maxCoeff(),
-            1e-9 * replayed->PointChiSquared().maxCoeff());
-  EXPECT_NEAR((*rescaled)->LogNormalization(false), replayed->LogNormalization(false), 1e-9);
+  EXPECT_LT(((*rescaled)->absorbed().PointChiSquared() - replayed->absorbed().PointChiSquared())
+                .cwiseAbs()
+                .maxCoeff(),
+            1e-9 * replayed->absorbed().PointChiSquared().maxCoeff());
+  EXPECT_NEAR((*rescaled)->absorbed().LogNormalization(false),
+              replayed->absorbed().LogNormalization(false), 1e-9);
   const int last = replayed->windows().count() - 2;
   const auto a = (*rescaled)->windows().TotalsAt(last, (*rescaled)->sums());
   const auto b = replayed->windows().TotalsAt(last, replayed->sums());

@@ -12,7 +12,7 @@
 #include <random>
 
 #include "core/estimator/expansion/guarded_importance.h"
-#include "core/estimator/expansion/settlement_particles.h"
+#include "core/estimator/expansion/reexpansion_particles.h"
 #include "core/estimator/posterior/posterior_draws.h"
 #include "tests/unit/core/bayes/many_parameters.h"
 #include "tests/unit/core/bayes/polynomial_cost.h"
@@ -128,8 +128,8 @@ const std::array<SquaresCase, 4> kSquares{{{4, 0.3, -0.3, 0.2, 16},
 // Four standard errors of a thousand independent particles of probability ½.
 TEST(SeparateModes, HaveTheirSharesOfTheParticles) {
   for (const SquaresCase& one : kSquares) {
-    const Particles particles = SampleForSettlement(CostOfSquares(one), DesignOfSquares(one),
-                                                    Matrix(0, 2 + one.linear), 1, Stop())
+    const Particles particles = SampleForReexpansion(CostOfSquares(one), DesignOfSquares(one),
+                                                     Matrix(0, 2 + one.linear), 1, Stop())
                                     .value();
     const Eigen::Index count = particles.etas.rows();
     ExpectSigns(one, particles.etas, Vector::Constant(count, 1.0 / static_cast<double>(count)),
@@ -167,7 +167,7 @@ TEST(SeparateModes, OnBoundsAreLeftToTempering) {
   const GuardedDraws drawn = DrawIfNearlyGaussian(cost, design, Matrix(0, n), 4096, Stop());
   EXPECT_FALSE(drawn.draws.has_value());
   EXPECT_FALSE(drawn.rough.has_value());
-  const Particles particles = SampleForSettlement(cost, design, Matrix(0, n), 1, Stop()).value();
+  const Particles particles = SampleForReexpansion(cost, design, Matrix(0, n), 1, Stop()).value();
   const auto above = (particles.etas.col(0).array() > 0).count();
   EXPECT_NEAR(static_cast<double>(above), 500, 4 * std::sqrt(500.0));
 }
