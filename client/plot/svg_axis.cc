@@ -10,7 +10,7 @@
 namespace polyest::internal {
 namespace {
 
-constexpr double kLeastRange = 1e-9;  // of the largest value
+constexpr double kMinRange = 1e-9;  // of the largest value
 // Beyond these, powers of ten of a step or of a unit are not numbers any more.
 constexpr double kShortest = 1e-300;
 constexpr double kLongest = 1e300;
@@ -28,7 +28,7 @@ double RoundStep(double step) {
 
 Axis MakeAxis(double lower, double upper, int count, double first_pixel, double last_pixel) {
   // Rounding errors of a constant are no range; ticks so close could not be told apart.
-  if (!(upper - lower > kLeastRange * std::max(std::abs(lower), std::abs(upper)))) {
+  if (!(upper - lower > kMinRange * std::max(std::abs(lower), std::abs(upper)))) {
     const double middle = 0.5 * (lower + upper);
     const double half = middle == 0 ? 0.5 : std::abs(middle) / 2;
     lower = middle - half;

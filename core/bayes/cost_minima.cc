@@ -16,7 +16,7 @@ constexpr int kMaxHalvings = 6;
 constexpr double kNear = 1e-3;
 // Least curvature of a step where the Hessian is not positive definite, as a fraction of the
 // largest.
-constexpr double kLeastCurvature = 1e-10;
+constexpr double kMinCurvature = 1e-10;
 constexpr double kSufficient = 1e-4;     // of the predicted decrease: Armijo's condition
 constexpr double kConvergedStep = 1e-9;  // in widths of the box
 constexpr double kReached = 1e-12;       // room to a limit, relative to it, that is rounding only
@@ -138,7 +138,7 @@ class NewtonSearch {
     if (steps_ == Steps::kWhereConvex) return std::nullopt;
     const SymmetricEigen eigen = DecomposeSymmetric(hessian);
     const Vector size = eigen.values.cwiseAbs();
-    const Vector curvature = size.cwiseMax(kLeastCurvature * size.maxCoeff());
+    const Vector curvature = size.cwiseMax(kMinCurvature * size.maxCoeff());
     return FiniteStep(-eigen.vectors *
                       (eigen.vectors.transpose() * gradient).cwiseQuotient(curvature));
   }

@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kNegligibleTrace = 1e-6;
 // Fewer terms than these are multiplied by G faster than the sums are factored.
-constexpr int kLeastTerms = 100;
+constexpr int kMinTerms = 100;
 
 // Returns F, as the header says.
 Matrix FactorOf(const MismatchSums& sums, bool relative) {
@@ -55,7 +55,7 @@ const Matrix& FactoredSums::Factor() const {
 
 // Whether two products with F are less work than one with G.
 bool FactoredSums::FactorPays() const {
-  return sums_->terms() >= kLeastTerms && 2 * rank() <= sums_->terms();
+  return sums_->terms() >= kMinTerms && 2 * rank() <= sums_->terms();
 }
 
 double FactoredSums::ChiSquared(const ConstVectorRef& d) const {

@@ -12,8 +12,6 @@
 namespace polyest::internal {
 namespace {
 
-// The floor of mean squared residuals, at the level of rounding, which keeps the logarithms finite.
-constexpr double kMinMeanSquare = 1e-24;
 constexpr double kMaxCorrelation = 1 - 1e-12;
 
 // The J of a channel as a function of A = χ² and D = Σ (u_k − u_{k−1})², and its derivatives; B = A

@@ -35,6 +35,10 @@
 
 namespace polyest::internal {
 
+// The floor of mean squared residuals in units of the working noise, at the level of rounding,
+// which keeps the logarithms finite.
+inline constexpr double kMinMeanSquare = 1e-24;
+
 // Returns −log of the likelihood of one channel as above; +∞ if χ² is +∞. `degrees` is N or the
 // degrees of freedom in its place; `differences` is Σ (u_k − u_{k−1})². For a channel with known
 // noise `chi_squared` may include Σ log(S_k/R_k), with which it may be below 0.

@@ -6,7 +6,7 @@
 namespace polyest::internal {
 namespace {
 
-constexpr Eigen::Index kLeastExcesses = 5;
+constexpr Eigen::Index kMinExcesses = 5;
 // Weight, in excesses, of the prior knowledge that k is about ½.
 constexpr double kPriorExcesses = 10;
 constexpr double kPriorShape = 0.5;
@@ -16,7 +16,7 @@ constexpr double kPriorShape = 0.5;
 std::optional<double> ParetoShape(Vector excesses) {
   std::sort(excesses.begin(), excesses.end());
   const Eigen::Index count = excesses.size();
-  if (count < kLeastExcesses) return std::nullopt;
+  if (count < kMinExcesses) return std::nullopt;
   const auto n = static_cast<double>(count);
   const double quarter = excesses[static_cast<Eigen::Index>(n / 4 + 0.5) - 1];
   const double largest = excesses[count - 1];
@@ -42,7 +42,7 @@ std::optional<double> TailShape(Vector log_weights) {
   const Eigen::Index count = log_weights.size();
   const auto n = static_cast<double>(count);
   const auto tail = static_cast<Eigen::Index>(std::min(0.2 * n, std::ceil(3 * std::sqrt(n))));
-  if (tail < kLeastExcesses) return std::nullopt;
+  if (tail < kMinExcesses) return std::nullopt;
   std::sort(log_weights.begin(), log_weights.end());
   const double largest = log_weights[count - 1];
   if (!std::isfinite(largest)) return std::nullopt;

@@ -15,7 +15,7 @@
 namespace polyest::internal {
 
 // The largest shape with which importance weights can be trusted.
-inline constexpr double kLargestTrustedShape = 0.7;
+inline constexpr double kMaxTrustedShape = 0.7;
 
 // Returns the shape k of the excesses x_i > 0 (at least 5, in any order) over their threshold,
 // drawn towards ½ by ten excesses' weight; none if they do not vary.

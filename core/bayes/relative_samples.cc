@@ -19,9 +19,8 @@ constexpr Eigen::Index kRatios = 4;
 RelativeDeviation RelativeDeviation::Of(const NoiseModel& model, double largest, double scale) {
   const double full = model.full_scale > 0 ? model.full_scale : largest;
   const double constant = model.absolute + model.relative_to_max * full;
-  return {
-      scale * constant, scale * model.relative,
-      std::max(NoiseModel::kLeastMagnitude * largest, (model.least - constant) / model.relative)};
+  return {scale * constant, scale * model.relative,
+          std::max(NoiseModel::kMinMagnitude * largest, (model.least - constant) / model.relative)};
 }
 
 double RelativeDeviation::At(double y) const {
@@ -69,9 +68,9 @@ Vector RelativeSamples::Predictions(const ConstVectorRef& d) const {
 // R = σ² + ρ,  R′ = 2 σ σ′,  R″ = 2 σ′²
 RelativeSamples::Variance RelativeSamples::VarianceAt(int64_t k, double y) const {
   const auto fact = facts_.col(k);
-  const bool flat = std::abs(y) <= fact[kLeastMagnitude];
+  const bool flat = std::abs(y) <= fact[kMinMagnitude];
   const double slope = flat ? 0 : std::copysign(fact[kSlope], y);
-  const double sigma = RelativeDeviation{fact[kAtZero], fact[kSlope], fact[kLeastMagnitude]}.At(y);
+  const double sigma = RelativeDeviation{fact[kAtZero], fact[kSlope], fact[kMinMagnitude]}.At(y);
   return {sigma * sigma + fact[kOwnError], 2 * sigma * slope, 2 * slope * slope};
 }
 
@@ -136,7 +135,7 @@ void RelativeSamples::EvaluateMany(const ConstMatrixRef& differences, Matrix& pr
     for (Eigen::Index k = first; k < std::min<Eigen::Index>(first + kRatios, count_); ++k) {
       const auto fact = facts_.col(k);
       y = product.col(k).array() + fact[kPredicted];
-      variances = (fact[kAtZero] + fact[kSlope] * y.abs().max(fact[kLeastMagnitude])).square() +
+      variances = (fact[kAtZero] + fact[kSlope] * y.abs().max(fact[kMinMagnitude])).square() +
                   fact[kOwnError];
       chi_squared.array() += (fact[kValue] - y).square() / variances;
       factors *= variances * (1 / fact[kReference]);

@@ -87,7 +87,7 @@ class RelativeSamples {
     kPredicted,  // y_0
     kAtZero,     // of RelativeDeviation
     kSlope,
-    kLeastMagnitude,
+    kMinMagnitude,
     kOwnError,  // ρ
     kReference  // R⁰
   };

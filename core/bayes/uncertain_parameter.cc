@@ -21,12 +21,12 @@ namespace {
 
 // The limits between which squares are finite numbers.
 constexpr double kMinScale = 1e-100;
-constexpr double kGreatestMagnitude = 1e100;
+constexpr double kMaxMagnitude = 1e100;
 // The shape beyond which a beta or gamma density is normal to within a percent.
-constexpr double kGreatestShape = 10'000;
+constexpr double kMaxShape = 10'000;
 // The greatest standard deviation ÷ mean of a lognormal: e^(37 scale) is still a number, and 100 is
 // a factor of 430 either way.
-constexpr double kGreatestRatio = 100;
+constexpr double kMaxRatio = 100;
 
 absl::Status CheckName(const std::string& name) {
   if (name.empty()) return InvalidField("name", "must not be empty");
@@ -34,22 +34,21 @@ absl::Status CheckName(const std::string& name) {
 }
 
 absl::Status CheckLocation(const char* family, const char* field, double value) {
-  if (std::abs(value) <= kGreatestMagnitude) return absl::OkStatus();
+  if (std::abs(value) <= kMaxMagnitude) return absl::OkStatus();
   return InvalidField({family, field}, absl::StrCat(value, " must be finite and at most ",
-                                                    kGreatestMagnitude, " in magnitude"));
+                                                    kMaxMagnitude, " in magnitude"));
 }
 
 absl::Status CheckScale(const char* family, const char* field, double value) {
   if (!(value > 0)) return InvalidField({family, field}, absl::StrCat(value, " must be > 0"));
-  if (value >= kMinScale && value <= kGreatestMagnitude) return absl::OkStatus();
-  return InvalidField({family, field}, absl::StrCat(value, " must lie between ", kMinScale, " and ",
-                                                    kGreatestMagnitude));
+  if (value >= kMinScale && value <= kMaxMagnitude) return absl::OkStatus();
+  return InvalidField({family, field},
+                      absl::StrCat(value, " must lie between ", kMinScale, " and ", kMaxMagnitude));
 }
 
 absl::Status CheckShape(const char* family, const char* field, double value) {
-  if (value >= 1 && value <= kGreatestShape) return absl::OkStatus();
-  return InvalidField({family, field},
-                      absl::StrCat(value, " must lie between 1 and ", kGreatestShape));
+  if (value >= 1 && value <= kMaxShape) return absl::OkStatus();
+  return InvalidField({family, field}, absl::StrCat(value, " must lie between 1 and ", kMaxShape));
 }
 
 absl::Status CheckBounds(const char* family, double lower, double upper) {
@@ -127,10 +126,10 @@ absl::StatusOr<UncertainParameter> UncertainParameter::Lognormal(std::string nam
   POLYEST_RETURN_IF_ERROR(CheckName(name));
   POLYEST_RETURN_IF_ERROR(CheckScale("lognormal", "mean", mean));
   POLYEST_RETURN_IF_ERROR(CheckScale("lognormal", "std_dev", std_dev));
-  if (std_dev > kGreatestRatio * mean) {
+  if (std_dev > kMaxRatio * mean) {
     return InvalidField(
         {"lognormal", "std_dev"},
-        absl::StrCat(std_dev, " must be at most ", kGreatestRatio, " times the mean ", mean));
+        absl::StrCat(std_dev, " must be at most ", kMaxRatio, " times the mean ", mean));
   }
   // scale² = log(1 + s²/m²), location = log m − scale²/2
   const double ratio = std_dev / mean;
@@ -171,17 +170,17 @@ absl::StatusOr<UncertainParameter> UncertainParameter::TruncatedNormal(std::stri
 }
 
 absl::Status UncertainParameter::Validate() const {
-  const auto is_shape = [](double shape) { return shape >= 1 && shape <= kGreatestShape; };
-  bool valid = !name.empty() && std::abs(location) <= kGreatestMagnitude && scale >= kMinScale &&
-               scale <= kGreatestMagnitude;
+  const auto is_shape = [](double shape) { return shape >= 1 && shape <= kMaxShape; };
+  bool valid = !name.empty() && std::abs(location) <= kMaxMagnitude && scale >= kMinScale &&
+               scale <= kMaxMagnitude;
   // A lognormal must be the exponential of a normal, which may be cut off, of a ratio of at most
-  // kGreatestRatio; a log-uniform one must lie within the limits of magnitude.
+  // kMaxRatio; a log-uniform one must lie within the limits of magnitude.
   if (map == ParameterMap::kExponential && germ.family != GermFamily::kUniform) {
     valid = valid &&
             (germ.family == GermFamily::kNormal || germ.family == GermFamily::kTruncatedNormal) &&
-            std::expm1(scale * scale) <= 1.0001 * kGreatestRatio * kGreatestRatio;
+            std::expm1(scale * scale) <= 1.0001 * kMaxRatio * kMaxRatio;
   } else if (map == ParameterMap::kExponential) {
-    valid = valid && std::abs(location) + scale <= 1.0001 * std::log(kGreatestMagnitude);
+    valid = valid && std::abs(location) + scale <= 1.0001 * std::log(kMaxMagnitude);
   }
   if (germ.family == GermFamily::kBeta) valid = valid && is_shape(germ.second);
   if (germ.family == GermFamily::kBeta || germ.family == GermFamily::kGamma) {

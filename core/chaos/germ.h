@@ -31,10 +31,6 @@ class Germ {
   explicit Germ(const GermShape& shape);
   static Germ Normal();
   static Germ Uniform();
-  // The largest shape for which cumulative probabilities and quantiles keep their accuracy; far
-  // beyond it the series of the incomplete beta and gamma functions do not converge. Callers refuse
-  // larger shapes.
-  static constexpr double kMaxShape = 1e5;
   // Requires alpha, beta ≥ 1: below 1 the density is infinite at a bound and has no mode.
   static Germ Beta(double alpha, double beta);
   // Requires shape ≥ 1, because below 1 the density is infinite at 0.
@@ -72,8 +68,9 @@ class Germ {
   double LogDensitySecondDerivative(double xi) const;
   double CumulativeProbability(double xi) const;
   // Returns the ξ with CumulativeProbability(ξ) = probability, 0 < probability < 1. Its error is at
-  // most 1e-12 of the standard deviation for shapes up to 1000 and 1e-9 up to kMaxShape, because
-  // log Γ rounds in proportion to shape · log(shape).
+  // most 1e-12 of the standard deviation for shapes up to 1000 and 1e-9 up to 1e5, because log Γ
+  // rounds in proportion to shape · log(shape). Far beyond, the series of the incomplete beta and
+  // gamma functions do not converge; priors have shapes up to 10,000.
   double Quantile(double probability) const;
   // Returns the ξ with CumulativeProbability(ξ) = Φ(score), Φ that of N(0, 1), accurate in both
   // tails. A score beyond ±kMaxScore, whose probability is 10⁻³⁰⁰, counts as ±kMaxScore.

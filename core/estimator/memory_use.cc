@@ -65,9 +65,7 @@ int64_t ExpectedBytes(const ResolvedProblem& problem) {
   const int dimension = problem.dimension();
   const Truncation truncation = FirstTruncation(options, dimension);
   const auto terms = static_cast<double>(TermCount(dimension, truncation, kMaxTerms));
-  const double points = options.points == PointSet::kGaussTensor
-                            ? std::pow(truncation.order + 1, dimension)
-                            : std::ceil(options.points_per_term * terms);
+  const double points = PointCountOnPrior(options, dimension, truncation, terms);
   return Bytes({terms, points + CheckCount(dimension), static_cast<double>(problem.channels()),
                 StatesOf(problem)});
 }

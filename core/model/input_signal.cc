@@ -144,7 +144,7 @@ double ClosedFormBreak(const HalfSineBumpInput& input, double time_s) {
 }
 
 // So few knots are not worth moving the others.
-constexpr std::ptrdiff_t kLeastForgotten = 1024;
+constexpr std::ptrdiff_t kMinForgotten = 1024;
 
 template <class Input>
 constexpr bool kHasKnots =
@@ -234,7 +234,7 @@ void InputSignal::Forget(double time_s) {
   const auto next = std::upper_bound(knot_time_s_.begin(), knot_time_s_.end(), time_s);
   const std::ptrdiff_t kept = next - knot_time_s_.begin() - kKnotsBehind;
   // The first knot, where a smooth curve begins, stays.
-  if (kept < kLeastForgotten || kept < std::ssize(knot_time_s_) / 2) return;
+  if (kept < kMinForgotten || kept < std::ssize(knot_time_s_) / 2) return;
   const auto forget = [kept](std::vector<double>& of_knots) {
     if (!of_knots.empty()) of_knots.erase(of_knots.begin() + 1, of_knots.begin() + kept);
   };

@@ -8,7 +8,7 @@ namespace polyest::internal {
 namespace {
 
 // A pivot of I − M below this is rounding: nothing is left of the variance there.
-constexpr double kLeastPivot = 16 * std::numeric_limits<double>::epsilon();
+constexpr double kMinPivot = 16 * std::numeric_limits<double>::epsilon();
 
 Eigen::Index Packed(Eigen::Index n, Eigen::Index i, Eigen::Index j) {
   return GaussianStates::FactorColumn(n, i, j);
@@ -179,9 +179,9 @@ void BackwardPass::Correct(Marked& states, const Eigen::ArrayXXd& epsilon,
         element -= C.col(Packed(n_, i, k)) * C.col(Packed(n_, j, k));
       }
       const auto pivot = C.col(Packed(n_, j, j));
-      C.col(Packed(n_, i, j)) =
-          i == j ? (element > kLeastPivot).select(element.max(0).sqrt(), 0).eval()
-                 : (pivot > 0).select(element / pivot, 0).eval();
+      C.col(Packed(n_, i, j)) = i == j
+                                    ? (element > kMinPivot).select(element.max(0).sqrt(), 0).eval()
+                                    : (pivot > 0).select(element / pivot, 0).eval();
     }
   }
   for (Eigen::Index j = 0; j < n_; ++j) {

@@ -6,7 +6,7 @@ namespace polyest::internal {
 namespace {
 
 // A gradient so small beside the slope over the points says nothing of the direction.
-constexpr double kLeastGradient = 1e-6;
+constexpr double kMinGradient = 1e-6;
 
 }  // namespace
 
@@ -164,7 +164,7 @@ void GaussianStates::TurnToGradient(const Eigen::ArrayXXd& outputs, double part)
   length_ = gain_.square().rowwise().sum().sqrt();
   for (Eigen::Index j = 0; j < n; ++j) {
     direction_.col(j) =
-        (length_ > kLeastGradient * slope_).select(gain_.col(j) / length_, direction_.col(j));
+        (length_ > kMinGradient * slope_).select(gain_.col(j) / length_, direction_.col(j));
   }
   LookAlong();
 }

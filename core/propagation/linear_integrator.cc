@@ -14,7 +14,7 @@ namespace polyest::internal {
 namespace {
 
 // A state beyond it is a failure: its square, which the sums of an estimate need, must be finite.
-constexpr double kLargestState = 1e100;
+constexpr double kMaxState = 1e100;
 
 class LinearIntegrator final : public BlockIntegrator {
  public:
@@ -89,7 +89,7 @@ IntegratorOutcome LinearIntegrator::AdvanceTo(double time_s, double stop_time_s,
     // Each of the two times may be off by a rounding error.
     constexpr double kRoundings = 4 * std::numeric_limits<double>::epsilon();
     StepBy(time_s - time_s_, kRoundings * std::abs(time_s));
-    if (!(next_.abs() <= kLargestState).all()) return Failure();
+    if (!(next_.abs() <= kMaxState).all()) return Failure();
     states_.swap(next_);
     time_s_ = time_s;
   }

@@ -7,7 +7,7 @@ namespace polyest::internal {
 namespace {
 
 // The least part of an interval, so that its ends differ in spite of rounding.
-constexpr double kLeastPart = 1e-9;
+constexpr double kMinPart = 1e-9;
 
 void DivideEvenly(double start_s, double end_s, int parts, std::vector<double>& ends_s) {
   for (int part = 1; part < parts; ++part) {
@@ -26,7 +26,7 @@ void DivideForNoise(double start_s, double end_s, double rate, std::vector<doubl
   if (parts <= kMaxEvenParts) {
     return DivideEvenly(start_s, end_s, std::max(1, static_cast<int>(parts)), ends_s);
   }
-  const double shortest_s = std::max(1 / rate, kLeastPart * interval_s);
+  const double shortest_s = std::max(1 / rate, kMinPart * interval_s);
   for (double left_s = 0; left_s < interval_s;) {
     ends_s.push_back(end_s - left_s);
     left_s += std::max(shortest_s, left_s / kMaxEvenParts);

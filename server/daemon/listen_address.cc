@@ -10,7 +10,7 @@
 namespace polyest::internal {
 namespace {
 
-constexpr int kLargestPort = 65'535;
+constexpr int kMaxPort = 65'535;
 
 bool IsHost(const std::string& host) {
   const bool bracketed = host.starts_with('[');
@@ -36,14 +36,14 @@ absl::StatusOr<ListenAddress> ListenAddress::Parse(const std::string& text,
     const std::string port = text.substr(colon + 1);
     ListenAddress address{text.substr(0, colon), 0};
     if (IsHost(address.host) && IsPort(port) && absl::SimpleAtoi(port, &address.port) &&
-        address.port <= kLargestPort) {
+        address.port <= kMaxPort) {
       return address;
     }
   }
   return absl::InvalidArgumentError(absl::StrFormat(
       "%s: \"%s\" must be HOST:PORT with a port from 0 to %d, as in 127.0.0.1:50051 or "
       "[::1]:50051",
-      flag, text, kLargestPort));
+      flag, text, kMaxPort));
 }
 
 std::string ListenAddress::ToString() const { return absl::StrCat(host, ":", port); }

@@ -17,7 +17,7 @@
 namespace polyest::internal {
 namespace {
 
-constexpr double kLargestWindow_s = 3600;
+constexpr double kMaxWindow_s = 3600;
 
 constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
 
@@ -65,10 +65,10 @@ void AppendRow(const SampleRow& place, const std::vector<double>& values, Sample
 }  // namespace
 
 absl::Status CheckReorderWindow(const FieldPath& field, double window_s) {
-  if (window_s >= 0 && window_s <= kLargestWindow_s) return absl::OkStatus();
+  if (window_s >= 0 && window_s <= kMaxWindow_s) return absl::OkStatus();
   return InvalidField(field, absl::StrFormat("%g must be from 0 to %g s; 0 means that rows come in "
                                              "time order",
-                                             window_s, kLargestWindow_s));
+                                             window_s, kMaxWindow_s));
 }
 
 RowReorder::RowReorder(std::vector<std::string> columns, double window_s)

@@ -48,7 +48,7 @@ void ExpectAgreement(std::vector<double> runs, const PropagatedOutput& predicted
   const double std_dev_error = std::sqrt((fourth - second * second) / n) / (2 * std_dev);
   ASSERT_LT(predicted.residual(k), mean_error) << "the expansion must be finer than the oracle";
   EXPECT_NEAR(predicted.mean(k), mean, kErrors * mean_error);
-  EXPECT_NEAR(predicted.standard_deviation(k), std_dev, kErrors * std_dev_error);
+  EXPECT_NEAR(predicted.std_dev(k), std_dev, kErrors * std_dev_error);
   // The number of runs below the p-quantile is binomial, so that the quantile lies between the
   // order statistics of rank n p ± 4 √(n p (1 − p)).
   std::sort(runs.begin(), runs.end());

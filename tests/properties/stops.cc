@@ -23,7 +23,7 @@ namespace {
 constexpr int kRounds = 4;                // of each problem, stopped at other moments
 constexpr double kFirstPatience = 0.025;  // of the questions of an undisturbed record
 constexpr double kMorePatience = 1.05;    // after each stop, so that every record gets through
-constexpr int64_t kFewestStops = 20;
+constexpr int64_t kMinStops = 20;
 
 // What an estimate says, as text in which every bit shows.
 std::string TextOf(const Estimate& estimate) {
@@ -81,7 +81,7 @@ int Run(uint64_t first, int count) {
   for (int i = 0; i < count; ++i) changes += Changes(first + static_cast<uint64_t>(i), stops);
   std::printf("%d problems, %lld stops, %d changed estimates\n", count,
               static_cast<long long>(stops), changes);
-  return changes == 0 && stops >= kFewestStops * count ? EXIT_SUCCESS : EXIT_FAILURE;
+  return changes == 0 && stops >= kMinStops * count ? EXIT_SUCCESS : EXIT_FAILURE;
 }
 
 }  // namespace

@@ -17,7 +17,7 @@ namespace {
 
 // Rows since the state kept, or half of those between two checkpoints if these are fewer, that it
 // takes to judge the states.
-constexpr int64_t kLeastRows = 256;
+constexpr int64_t kMinRows = 256;
 // Factor by which the record may become longer before the error of the states exceeds the limit.
 constexpr double kRoomToGrow = 16;
 
@@ -25,7 +25,7 @@ absl::Status Refused(const char* why) { return InfeasibleError(why); }
 
 int64_t RowsToJudge(const ResolvedProblem& problem) {
   const int64_t interval = problem.problem().integration.samples_between_checkpoints;
-  return std::clamp<int64_t>(interval / 2, 1, kLeastRows);
+  return std::clamp<int64_t>(interval / 2, 1, kMinRows);
 }
 
 // Returns the largest coordinate of the points (local coordinates of `to`) in units of the trusted

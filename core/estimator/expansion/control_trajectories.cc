@@ -9,8 +9,8 @@
 namespace polyest::internal {
 namespace {
 
-constexpr double kControlWeight = 1e-3;     // that counts, relative to the heaviest check point
-constexpr double kLeastEigenvalue = 1e-14;  // relative to the largest
+constexpr double kControlWeight = 1e-3;   // that counts, relative to the heaviest check point
+constexpr double kMinEigenvalue = 1e-14;  // relative to the largest
 
 // Returns by how much each channel's χ²/2 counts in the cost at d: an unknown scale is the one that
 // the residuals have there.
@@ -45,7 +45,7 @@ double ShiftAt(const RegionalExpansion& expansion, const Cost& cost, int control
   if (!hessian.allFinite() || !score.allFinite()) return 0;
   // √(sᵀ H⁻¹ s)
   const SymmetricEigen eigen = DecomposeSymmetric(hessian);
-  const double least = kLeastEigenvalue * eigen.values.maxCoeff();
+  const double least = kMinEigenvalue * eigen.values.maxCoeff();
   return (eigen.vectors.transpose() * score)
       .cwiseQuotient(eigen.values.cwiseMax(least).cwiseSqrt())
       .norm();

@@ -31,7 +31,7 @@ namespace polyest::internal {
 // The tolerance of control trajectories ÷ that of the others.
 inline constexpr double kControlTolerance = 0.1;
 // Integrators support no smaller relative tolerance (IntegrationOptions).
-inline constexpr double kLeastTolerance = 1e-13;
+inline constexpr double kMinControlTolerance = 1e-13;
 
 // Returns by how many standard deviations the error of integration may move the estimate: the
 // largest shift over the check points that have a weight in the posterior (AgreementWithModel). 0

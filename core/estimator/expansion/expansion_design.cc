@@ -27,8 +27,8 @@ constexpr int kMaxDrawnChecks = 200;
 constexpr int kChecksPastDimension = 3;
 constexpr double kJustInside = 1 - 1e-12;  // keeps rounding from putting a point outside Ω
 
-int PointCount(const ResolvedProblem& problem, const Basis& basis) {
-  return static_cast<int>(std::ceil(problem.problem().expansion.points_per_term * basis.size()));
+int PointsFor(const ResolvedProblem& problem, const Basis& basis) {
+  return static_cast<int>(PointCount(problem.problem().expansion, basis.size()));
 }
 
 // Returns local coordinates in units of the trusted box: e with η = middle + half ∘ e.
@@ -71,7 +71,7 @@ absl::StatusOr<ExpansionDesign> DesignForPrior(const ResolvedProblem& problem,
   design.region = Region::WholePrior(n);
   design.basis = std::make_shared<Basis>(prior.germs(), truncation);
   const int order = design.basis->order();
-  const int count = PointCount(problem, *design.basis);
+  const int count = PointsFor(problem, *design.basis);
   POLYEST_ASSIGN_OR_RETURN(design.points, CollocationPoints(options.points, prior.germs(), order,
                                                             count, static_cast<int>(kMaxPoints)));
   // The check points are later points of a Halton sequence than the collocation points, so they are
@@ -119,7 +119,7 @@ ExpansionDesign DesignForRegion(const ResolvedProblem& problem, const Truncation
   design.basis = std::make_shared<Basis>(std::vector<Germ>(static_cast<size_t>(n), Germ::Uniform()),
                                          truncation);
   const PointSet set = options.points == PointSet::kHammersley ? options.points : PointSet::kHalton;
-  design.points = 2 * UnitCubePoints(set, n, PointCount(problem, *design.basis)).array() - 1;
+  design.points = 2 * UnitCubePoints(set, n, PointsFor(problem, *design.basis)).array() - 1;
   MoveInside(problem.prior(), region, inside, design.points);
   design.region = std::move(region);
   design.check_points.resize(0, n);

@@ -14,10 +14,10 @@ namespace {
 
 // Samples of channels with outliers up to which each is kept, or as many for each parameter. With
 // more of them the posterior is so narrow that the weights do not change over it.
-constexpr int64_t kMostKept = 64, kMostKeptPerParameter = 8;
+constexpr int64_t kMaxKept = 64, kMaxKeptPerParameter = 8;
 // The same for channels of relative noise, which must also have left the minima that few samples of
 // large noise make.
-constexpr int64_t kMostKeptRelative = 256;
+constexpr int64_t kMaxKeptRelative = 256;
 
 // Returns the number of samples that are kept.
 template <class Samples>
@@ -70,8 +70,8 @@ void RegionalExpansion::AddToFew(const WeightedSample& sample) {
     AddRobust(sample);
   }
   const SampleBySample& few = *absorbed_.few;
-  const int64_t most = std::max<int64_t>(kMostKept, kMostKeptPerParameter * problem_.dimension());
-  if (CountOf(few.channels) > most || CountOf(few.relative) > std::max(most, kMostKeptRelative)) {
+  const int64_t most = std::max<int64_t>(kMaxKept, kMaxKeptPerParameter * problem_.dimension());
+  if (CountOf(few.channels) > most || CountOf(few.relative) > std::max(most, kMaxKeptRelative)) {
     absorbed_.few.reset();
   }
 }

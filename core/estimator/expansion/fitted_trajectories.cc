@@ -16,7 +16,7 @@ namespace {
 // A block of so few trajectories takes as long as a block of one.
 constexpr Eigen::Index kMaxControls = kLanes;
 // The tolerance must leave room for one of at most half its size.
-constexpr double kLeastControllable = 2 * kLeastTolerance;
+constexpr double kMinControllable = 2 * kMinControlTolerance;
 // A tenth of the tolerance takes at most ten times the steps, with a method of order 1.
 constexpr int kMoreSteps = 10;
 
@@ -142,7 +142,7 @@ int FittedTrajectories::CountControls() const {
   const Problem& problem = problem_.problem();
   const Model& model = *problem.model;
   if (!HasCheckpointsInRuns(model) || model.description().states.empty()) return 0;
-  if (problem.integration.relative_tolerance < kLeastControllable || StepsExactly()) return 0;
+  if (problem.integration.relative_tolerance < kMinControllable || StepsExactly()) return 0;
   return static_cast<int>(std::min<Eigen::Index>(kMaxControls, checks()));
 }
 
@@ -153,7 +153,7 @@ void FittedTrajectories::StartControls(int run) {
       thetas_.middleRows(points(), controls_), problem_.outputs(), threads_, run);
   IntegrationOptions& integration = specification.integration;
   integration.relative_tolerance =
-      std::max(kLeastTolerance, kControlTolerance * integration.relative_tolerance);
+      std::max(kMinControlTolerance, kControlTolerance * integration.relative_tolerance);
   const int most = std::numeric_limits<int>::max();
   integration.max_steps =
       integration.max_steps > most / kMoreSteps ? most : kMoreSteps * integration.max_steps;

@@ -20,7 +20,7 @@ constexpr double kHeaviest = 0.01;
 constexpr int kPointsOfModes = 4, kAdaptations = 5;
 // Least effective size of draws of several Gaussians from which chains may start, and the heaviest
 // weight.
-constexpr double kLeastRough = 500, kHeaviestRough = 0.03;
+constexpr double kMinRough = 500, kHeaviestRough = 0.03;
 // The part of the guesses that may lie out of their reach, in the tails of a mode, at most.
 constexpr double kMaxBeyond = 0.01;
 
@@ -32,7 +32,7 @@ bool IsEven(const WeightedDraws& draws, int points) {
 bool IsReliable(const WeightedDraws& draws, int points) {
   if (!IsEven(draws, points)) return false;
   const std::optional<double> shape = TailShape(draws.weights.array().log());
-  return !shape || *shape <= kLargestTrustedShape;
+  return !shape || *shape <= kMaxTrustedShape;
 }
 
 // Draws from the Gaussian at the only minimum, if it is one.
@@ -50,7 +50,7 @@ void DrawFromModes(const Cost& cost, int points, const Stop& stop, ModeSearch& s
                    GuardedDraws& result) {
   std::optional<std::vector<GaussianMode>> modes = search.FindModes();
   if (!modes) return;
-  double best = kLeastRough;
+  double best = kMinRough;
   for (int i = 0; i <= kAdaptations && stop.Check().ok(); ++i) {
     WeightedDraws drawn =
         ImportanceSample(cost, search.lower(), search.upper(), *modes, kPointsOfModes * points);

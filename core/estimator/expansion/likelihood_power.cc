@@ -13,7 +13,7 @@ namespace {
 constexpr double kMaxShift = 0.5;  // in standard deviations
 constexpr double kMaxSpread = 1;   // of β (J_m − J)
 constexpr double kStep = 0.8;      // from one trial of β to the next
-constexpr double kLeastPower = 1e-12;
+constexpr double kMinPower = 1e-12;
 // In more dimensions the collocation points are too few to confirm any posterior that is much
 // narrower than the region.
 constexpr int kMaxDimension = 3;
@@ -81,7 +81,7 @@ double LikelihoodPower(const RegionalExpansion& expansion, const Cost& cost) {
   const double inflation = left > 0 ? std::sqrt(count / left) : 2;
   const double effective = std::min(cost.dimension() + 2.0, 0.5 * count);
   double beta = cost.power();
-  while (beta > kLeastPower && !Confirmed(points, beta, inflation, effective)) beta *= kStep;
+  while (beta > kMinPower && !Confirmed(points, beta, inflation, effective)) beta *= kStep;
   return beta;
 }
 

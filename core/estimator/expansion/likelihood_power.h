@@ -6,7 +6,7 @@
 // expansion follows badly make the posterior narrow about a wrong place. The collocation points
 // show by how much: there the model's own mismatch J_m is known. The posterior is therefore taken
 // from the likelihood to the power β, the largest one at which
-//   β (J_m − J) has a standard deviation of at most 1 over the posterior ∝ e^{−β J − J_prior},
+//   β (J_m − J) has a standard deviation of at most 1 over the posterior ∝ e^{−β J − J_apriori},
 //   this posterior has an effective number of collocation points of at least n + 2,
 // so that it is nowhere sharper than what the points can confirm. A region that moves to such a
 // posterior has a smaller error, and β grows from move to move until it is 1: the continuation from

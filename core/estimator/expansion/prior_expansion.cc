@@ -22,7 +22,7 @@ namespace {
 // Number of columns (output × time) processed at once. It bounds the memory and the time between
 // two checks of the stop request.
 constexpr int64_t kColumnsAtATime = 128;
-constexpr size_t kLeastDraws = 2;  // have a variance
+constexpr size_t kMinDraws = 2;  // have a variance
 // As many times of a grid as this are not counted any more.
 constexpr int64_t kMaxCounted = int64_t{1} << 50;
 
@@ -145,7 +145,7 @@ absl::StatusOr<std::unique_ptr<PriorExpansion>> PriorExpansion::Make(const Resol
   const ExpansionOptions& design = problem.problem().expansion;
   const std::vector<Germ>& germs = problem.prior().germs();
   auto basis = std::make_shared<const Basis>(germs, FirstTruncation(design, problem.dimension()));
-  const int count = static_cast<int>(std::ceil(design.points_per_term * basis->size()));
+  const int count = static_cast<int>(PointCount(design, basis->size()));
   POLYEST_ASSIGN_OR_RETURN(Matrix points,
                            CollocationPoints(design.points, germs, basis->order(), count));
   POLYEST_ASSIGN_OR_RETURN(CollocationMatrix matrix,
@@ -226,9 +226,9 @@ absl::Status PriorExpansion::LeaveOutFailed(const Stop& stop) {
   for (const PointFailure& failure : failures()) failed.insert(failure.point);
   const auto has_failed = [&](int row) { return failed.contains(row); };
   std::erase_if(kept_draws_, has_failed);
-  if (std::erase_if(kept_points_, has_failed) > 0 || kept_draws_.size() < kLeastDraws) {
+  if (std::erase_if(kept_points_, has_failed) > 0 || kept_draws_.size() < kMinDraws) {
     if (kept_points_.size() <= static_cast<size_t>(basis_->size()) ||
-        kept_draws_.size() < kLeastDraws) {
+        kept_draws_.size() < kMinDraws) {
       return TooFewLeft();
     }
     POLYEST_ASSIGN_OR_RETURN(
@@ -245,7 +245,7 @@ absl::Status PriorExpansion::TooFewLeft() const {
       "only %d of %d collocation points and %d of %d draws of the prior could be integrated and an "
       "expansion of %d terms needs more points, and at least %d draws; at %s the model failed at t "
       "= %g s: %s (solver flag %d)",
-      kept_points_.size(), points(), kept_draws_.size(), draws(), basis_->size(), kLeastDraws,
+      kept_points_.size(), points(), kept_draws_.size(), draws(), basis_->size(), kMinDraws,
       DescribePoint(last.point), last.time_s, last.reason, last.flag));
 }
 

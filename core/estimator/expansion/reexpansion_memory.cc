@@ -9,9 +9,9 @@ namespace polyest::internal {
 namespace {
 
 // Least effective size of reweighted particles, as a fraction of their number.
-constexpr double kLeastEffective = 0.9;
+constexpr double kMinEffectiveToReweigh = 0.9;
 // Fewer particles than this do not tell what one in a hundred of them does.
-constexpr Eigen::Index kFewestParticles = 500;
+constexpr Eigen::Index kMinParticles = 500;
 // By how much a region may reach beyond another one that contains it, as a factor.
 constexpr double kBeyond = 1.1;
 constexpr int64_t kGrowthOfRecord = 2;
@@ -51,7 +51,7 @@ bool IsRaisingInVain(const OrderInVain& tried, double accepted, const Region& re
 Matrix Reweighted(const Matrix& particles, const Vector& costs, const Cost& present,
                   const ExpansionDesign& design) {
   const Matrix none(0, particles.cols());
-  if (costs.size() != particles.rows() || costs.size() < kFewestParticles) return none;
+  if (costs.size() != particles.rows() || costs.size() < kMinParticles) return none;
   const Matrix etas = design.region.ManyToLocal(particles);
   Vector now;
   present.EvaluateMany(etas, now);
@@ -60,7 +60,7 @@ Matrix Reweighted(const Matrix& particles, const Vector& costs, const Cost& pres
   if (!std::isfinite(most)) return none;
   weights = (weights.array() - most).exp();
   const auto count = static_cast<double>(weights.size());
-  if (!(EffectiveSizeOfWeights(weights) >= kLeastEffective * count)) return none;
+  if (!(EffectiveSizeOfWeights(weights) >= kMinEffectiveToReweigh * count)) return none;
   weights /= weights.sum();
   return etas(EquallyWeighted(weights, static_cast<int>(weights.size())), Eigen::all);
 }

@@ -27,7 +27,7 @@ constexpr double kWithinDomain = 1 - 1e-9;
 // expansion's error squared, in units of the noise, from which on its order is raised.
 constexpr double kMaxOwnError = 1e-4;
 // Ratio of a score's standard deviation to that for which the region was chosen.
-constexpr double kLeastScoreRatio = 0.6, kMaxScoreRatio = 1.25;
+constexpr double kMinScoreRatio = 0.6, kMaxScoreRatio = 1.25;
 
 // One run, expanded about a path.
 class Elimination {
@@ -230,7 +230,7 @@ bool Elimination::IsScoreWithinRegion() const {
   const Eigen::Index own = problem_.population()->own;
   const double spread = path_.spread.row(own).norm();
   const double ratio = std::sqrt(score_->posterior().variance) / spread;
-  return ratio > kLeastScoreRatio && ratio < kMaxScoreRatio &&
+  return ratio > kMinScoreRatio && ratio < kMaxScoreRatio &&
          std::abs(score_->posterior().mean - path_.centre[own]) < spread;
 }
 

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/bayes/mismatch.h"
 #include "core/bayes/noise.h"
 #include "core/estimator/posterior/corrected_lag1.h"
 #include "core/estimator/posterior/independent_share.h"
@@ -19,9 +20,8 @@ namespace polyest::internal {
 namespace {
 
 constexpr Eigen::Index kDrawsForNoise = 200;
-constexpr int64_t kLeastSums = 8;         // of successive residuals
-constexpr double kAlike = 1.5;            // largest ratio of mean squares that are much the same
-constexpr double kMinMeanSquare = 1e-24;  // floor for residuals that vanish
+constexpr int64_t kMinSums = 8;  // of successive residuals
+constexpr double kAlike = 1.5;   // largest ratio of mean squares that are much the same
 
 // Returns E[χ²] of a channel over the posterior; E[σ²] = E[χ²]/N for an unknown scale.
 double MeanChiSquared(const Cost& cost, const RegionalExpansion& expansion, int c,
@@ -46,7 +46,7 @@ void DescribeSums(const AssessmentRequest& request, const Vector& eta, const Vec
   const RegionalExpansion& expansion = *request.expansion;
   const NoiseModel& model = request.problem->problem().measured[static_cast<size_t>(c)].noise;
   const ResidualBlocks& blocks = expansion.Blocks(c);
-  if (blocks.count() < kLeastSums || model.outliers != OutlierHandling::kNone) return;
+  if (blocks.count() < kMinSums || model.outliers != OutlierHandling::kNone) return;
   const ChannelSums& sums = expansion.sums()[static_cast<size_t>(c)];
   const Vector delta = eta - expansion.LinearizedAt();
   const double of_all = sums.samples.ChiSquared(d) / static_cast<double>(sums.samples.count());

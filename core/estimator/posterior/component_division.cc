@@ -38,7 +38,7 @@ int MaxComponents(const ResolvedProblem& problem) {
   const ExpansionOptions& options = problem.problem().expansion;
   const int n = problem.dimension();
   const auto terms = TermCount(n, FirstTruncation(options, n), kMaxTerms);
-  const double points = options.points_per_term * static_cast<double>(terms);
+  const double points = PointCount(options, static_cast<double>(terms));
   return std::max(kPiecesAtLeast, static_cast<int>(kMaxTrajectories / points));
 }
 

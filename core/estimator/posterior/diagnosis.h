@@ -23,7 +23,7 @@ namespace polyest::internal {
 inline constexpr double kInaccurateShift = 0.25;
 // Power of the likelihood below which the posterior shows where the expansion was made and not what
 // the data say.
-inline constexpr double kLeastUsed = 0.01;
+inline constexpr double kMinUsed = 0.01;
 
 struct Findings {
   // Whether more of the shift is due to the integration than to the expansion.
@@ -40,7 +40,7 @@ struct Findings {
   // again without a limit.
   bool CarriesError() const;
   // Whether the expansion follows the model so far that the posterior tells of the data.
-  bool UsesData() const { return power >= kLeastUsed; }
+  bool UsesData() const { return power >= kMinUsed; }
   // Whether parameter i must not be called identified.
   bool IsDoubtful(int i) const {
     return postponed.any() || power < 1 || !not_mixed.empty() ||

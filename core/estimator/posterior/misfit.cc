@@ -38,7 +38,7 @@ Matrix StartsOf(const Cost& cost, const ExpansionDesign& design) {
 }
 
 // Returns by how much χ² would fall, to second order, if the prior let the parameters go: gᵀ H⁻¹ g
-// with the gradient g of J_prior and the Hessian H of the mismatch.
+// with the gradient g of J_apriori and the Hessian H of the mismatch.
 double HeldByPrior(const RegionalExpansion& expansion, const Cost& cost, const Vector& eta) {
   Cost without_prior = expansion.MakeCost(0);
   without_prior.set_power(1);

@@ -17,7 +17,7 @@ constexpr double kGain = 0.7;
 // Mean square left over that is worth no higher degree: a thousandth of a standard deviation.
 constexpr double kNegligible = 1e-6;
 // Part of the draws' effective number that the correction must leave.
-constexpr double kLeastEffective = 0.2;
+constexpr double kMinEffective = 0.2;
 
 // The posterior's standardized coordinates u = L⁻¹ (η − mean), L Lᵀ = covariance.
 class Standardization {
@@ -89,7 +89,7 @@ ModelCorrection CorrectByModel(const CheckDifferences& checks, const ConstMatrix
   ModelCorrection correction;
   if (checks.differences.size() < 2) return correction;
   // Where the posterior has moved away from the draws, their weights tell nothing of the model.
-  const bool represent = TailShape(checks.log_weights).value_or(0) <= kLargestTrustedShape;
+  const bool represent = TailShape(checks.log_weights).value_or(0) <= kMaxTrustedShape;
   if (represent || !(largest_shift <= kNegligibleShift)) {
     correction.pareto_shape = TailShape(checks.log_weights - checks.differences);
   }
@@ -108,7 +108,7 @@ ModelCorrection CorrectByModel(const CheckDifferences& checks, const ConstMatrix
     const Fit fit = FitPolynomial(Monomials(u_checks, degree), checks.differences, at_checks);
     if (!(fit.left < kGain * left)) continue;
     const Vector factors = -(Monomials(u, degree) * fit.coefficients);
-    if (EffectiveNumber(log_weights + factors) < kLeastEffective * effective_draws) continue;
+    if (EffectiveNumber(log_weights + factors) < kMinEffective * effective_draws) continue;
     left = fit.left;
     correction.degree = degree;
     correction.log_factors = factors;

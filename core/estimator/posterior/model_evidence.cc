@@ -94,13 +94,13 @@ class DensityCorrection {
         kDraws, [&](Eigen::Index i) { return -lack[i]; }, kDraws);
     const double square = LogSumExp(
         kDraws, [&](Eigen::Index i) { return -2 * lack[i]; }, kDraws);
-    if (!(std::exp(2 * mean - square) > kLeastEffectiveShare)) return std::nullopt;
+    if (!(std::exp(2 * mean - square) > kMinEffectiveShare)) return std::nullopt;
     return log_density_ + mean;
   }
 
  private:
   static constexpr int kDraws = 4'000;
-  static constexpr double kLeastEffectiveShare = 0.05;
+  static constexpr double kMinEffectiveShare = 0.05;
 
   const ExpansionDesign& design_;
   const Prior& prior_;

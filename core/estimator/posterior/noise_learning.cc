@@ -29,7 +29,7 @@ constexpr double kMaxFall = 0.5;
 constexpr double kMaxRise = 4;
 // Least noise in units of the largest sample. The squares of a record with less would drown in
 // rounding errors.
-constexpr double kLeastNoiseToSignal = 1e-9;
+constexpr double kMinNoiseToSignal = 1e-9;
 // If the expansion's own error makes up more than this share of χ², the scale cannot be determined.
 constexpr double kMaxDiscount = 0.8;
 // Factor by which a scale that is not learned yet exceeds the largest sample.
@@ -167,7 +167,7 @@ class Revision {
     const double factor = std::clamp(std::pow(chi_squared / degrees, power), kMaxFall, kMaxRise);
     // The learned scale is not included.
     const RecordSummary::Channel& channel = record_.channels()[static_cast<size_t>(c)];
-    const double least = kLeastNoiseToSignal * channel.largest / channel.RootMeanSquareNoise();
+    const double least = kMinNoiseToSignal * channel.largest / channel.RootMeanSquareNoise();
     const double revised = std::max(noise.scale * factor, least);
     const double ratio = revised / noise.scale;
     const double worth_it = weighted ? kWorthItWithOutliers : kWorthIt;

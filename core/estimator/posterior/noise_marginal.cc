@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/bayes/factored_sums.h"
+#include "core/bayes/mismatch.h"
 #include "core/bayes/pareto_tail.h"
 #include "core/bayes/weighted_samples.h"
 #include "core/common/linear_algebra.h"
@@ -30,7 +31,6 @@ constexpr double kWidestPower = 1.0 / 16;
 constexpr double kMaxOwnError = 0.8;
 // Draws whose matrices are computed together.
 constexpr Eigen::Index kBlock = 128;
-constexpr double kLeastSum = 1e-24;  // of squares, as in the cost (mismatch.h)
 
 double LogOdds(double share) { return std::log(share / (1 - share)); }
 
@@ -208,14 +208,14 @@ void NoiseMarginal::AddFactors(const Channel& channel, Matrix deltas, const Vect
     if (!sums.correlation_unknown) continue;
     // The cost has one lag integrated out, in place of which the profile stands.
     const auto likelihood = [&](bool correlated) {
-      return NegativeLogLikelihood(sums.Degrees(), std::max(kLeastSum, chi_squared[i]), lags[i],
-                                   sums.scale_unknown, correlated);
+      return NegativeLogLikelihood(sums.Degrees(), std::max(kMinMeanSquare, chi_squared[i]),
+                                   lags[i], sums.scale_unknown, correlated);
     };
     factors[i] += likelihood(true) - likelihood(false);
   }
   const Matrix monomials = Monomials(deltas);
-  Eigen::ArrayXXd logs = (monomials * channel.grams).array().max(kLeastSum);
-  Eigen::ArrayXd present = (monomials * channel.present).array().max(kLeastSum);
+  Eigen::ArrayXXd logs = (monomials * channel.grams).array().max(kMinMeanSquare);
+  Eigen::ArrayXd present = (monomials * channel.present).array().max(kMinMeanSquare);
   const double half = 0.5 * (sums.scale_unknown ? static_cast<double>(sums.samples.count()) : 1);
   if (sums.scale_unknown) {
     logs = logs.log();

@@ -10,7 +10,7 @@ namespace polyest::internal {
 namespace {
 
 // The part of a prior's variance that the data must have taken away, for its place to say anything.
-constexpr double kLeastInformed = 0.1;
+constexpr double kMinInformed = 0.1;
 
 // Returns log ρ at its maximum − log ρ(x), the logarithms of the germ's density.
 double BelowMaximum(const Germ& germ, double x) {
@@ -33,7 +33,7 @@ PriorConflict FindPriorConflict(const ResolvedProblem& problem, const PosteriorD
     const double contraction = WeightedStandardDeviation(z, posterior.weights) / deviation[i];
     const double informed = 1 - contraction * contraction;
     const double x = prior.MarginalGerm(i, WeightedMean(z, posterior.weights));
-    if (informed > kLeastInformed) {
+    if (informed > kMinInformed) {
       found.of_parameters[i] =
           std::sqrt(2 * regularization * BelowMaximum(Germ(parameter.germ), x) / informed);
     }

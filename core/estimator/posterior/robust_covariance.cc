@@ -12,7 +12,7 @@ constexpr size_t kMinWindows = 12;
 // The fit must leave at least this share of the scores' covariance.
 constexpr double kMinLeft = 0.5;
 // Quantile of the largest eigenvalue's limiting law (Tracy–Widom, real) with tail 3·10⁻⁵.
-constexpr double kLargestEigenvalue = 4.5;
+constexpr double kMaxEigenvalue = 4.5;
 
 // Returns the value that the largest eigenvalue of a sample covariance of white n-vectors with ν
 // degrees of freedom exceeds by chance with probability 3·10⁻⁵ (I. Johnstone, "On the distribution
@@ -23,7 +23,7 @@ double LargestByChance(double degrees, double dimension) {
   const double a = std::sqrt(std::max(0.5, degrees - 0.5));
   const double b = std::sqrt(std::max(0.5, dimension - 0.5));
   const double spread = (a + b) * std::cbrt(1 / a + 1 / b);
-  return ((a + b) * (a + b) + kLargestEigenvalue * spread) / std::max(1.0, degrees);
+  return ((a + b) * (a + b) + kMaxEigenvalue * spread) / std::max(1.0, degrees);
 }
 
 // Returns whether the scores' scatter in direction u is more than chance allows, in a fit of

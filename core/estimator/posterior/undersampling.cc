@@ -13,8 +13,8 @@ namespace {
 
 constexpr int kPhases = 8;  // number of equal parts of an interval between samples
 // Fewest rows and turning points from which a response is judged.
-constexpr int kFewestRows = 8;
-constexpr size_t kFewestTurns = 4;
+constexpr int kMinRowsTested = 8;
+constexpr size_t kMinTurns = 4;
 // A turning point counts if the response swings by more than this many standard deviations of the
 // noise before and after it.
 constexpr double kSwing = 4;
@@ -179,7 +179,7 @@ double TurnsBetweenSamples(const Vector& outputs, const Times& times, const std:
     direction = rises ? 1 : -1;
     low = high = j;
   }
-  if (turns.size() < kFewestTurns) return 0;
+  if (turns.size() < kMinTurns) return 0;
   const double interval = (time(end) - time(begin)) / (std::ssize(rows) - 1.0);
   return (std::ssize(turns) - 1.0) * interval / (time(turns.back()) - time(turns.front()));
 }
@@ -200,7 +200,7 @@ std::optional<Aliased> AliasedChannel(const Findings& findings, const Times& tim
   std::optional<Aliased> least;
   for (int c = 0; c < m; ++c) {
     const std::vector<int> rows = RowsWithSamples(beginning, m, c);
-    if (std::ssize(rows) < kFewestRows) continue;
+    if (std::ssize(rows) < kMinRowsTested) continue;
     const Vector channel = OutputOf(outputs, 0, c, m);
     const double largest = channel.cwiseAbs().maxCoeff();
     const double turns = TurnsBetweenSamples(channel, times, rows,

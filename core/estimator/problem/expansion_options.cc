@@ -32,18 +32,13 @@ absl::Status ExpansionOptions::Validate(int dimension) const {
         absl::StrFormat("order %d of %d uncertain parameters needs more than %d terms, the limit",
                         truncation.order, dimension, kMaxTerms));
   }
-  const double count = points == PointSet::kGaussTensor
-                           ? std::pow(truncation.order + 1, dimension)
-                           : std::ceil(points_per_term * static_cast<double>(terms));
+  const double count = PointCountOnPrior(*this, dimension, truncation, static_cast<double>(terms));
   if (count > static_cast<double>(kMaxPoints)) {
     return FieldError(
         absl::StatusCode::kResourceExhausted, "expansion",
         absl::StrFormat("%.0f collocation points are needed; the limit is %d", count, kMaxPoints));
   }
-  // A tensor grid is used for the prior only; a moved expansion has points_per_term points per
-  // term.
-  const double moved = std::ceil(points_per_term * static_cast<double>(terms));
-  const double fewest = std::min(count, moved);
+  const double fewest = std::min(count, PointCount(*this, static_cast<double>(terms)));
   if (adaptive && fewest <= static_cast<double>(terms)) {
     return InvalidField("expansion.points_per_term",
                         absl::StrFormat("%g gives %.0f points for %d terms; an adaptive expansion "

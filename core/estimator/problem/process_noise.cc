@@ -51,13 +51,13 @@ Size SizeOf(const RandomWalk& walk) {
 }
 
 // Over more powers of ten no expansion follows the model.
-constexpr double kLeastBound = 1e-50, kGreatestBound = 1e50, kGreatestRatio = 1e20;
-constexpr double kLeastRatio = 1 + 1e-6;
+constexpr double kMinBound = 1e-50, kMaxBound = 1e50, kMaxRatio = 1e20;
+constexpr double kMinRatio = 1 + 1e-6;
 
 bool AreBounds(const Size& size) {
   const double ratio = size.upper / size.lower;
-  return size.lower >= kLeastBound && size.upper <= kGreatestBound && ratio >= kLeastRatio &&
-         ratio <= kGreatestRatio;
+  return size.lower >= kMinBound && size.upper <= kMaxBound && ratio >= kMinRatio &&
+         ratio <= kMaxRatio;
 }
 
 absl::Status CheckSize(const FieldPath& path, const Size& size) {
@@ -83,7 +83,7 @@ absl::Status CheckSize(const FieldPath& path, const Size& size) {
       field("lower"),
       absl::StrFormat("%g must be above 0 and below upper %g; both must lie between %g and %g, and "
                       "upper be at most %g times lower",
-                      size.lower, size.upper, kLeastBound, kGreatestBound, kGreatestRatio));
+                      size.lower, size.upper, kMinBound, kMaxBound, kMaxRatio));
 }
 
 std::vector<absl::Status> CheckEach(const Problem& problem) {

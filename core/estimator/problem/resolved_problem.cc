@@ -27,7 +27,7 @@
 namespace polyest::internal {
 namespace {
 
-constexpr double kGreatestFixed = 1e100;  // as of the numbers of a prior
+constexpr double kMaxFixed = 1e100;  // as of the numbers of a prior
 
 // Refuses a name that is none of the `known` ones, which `list` shows.
 absl::Status UnknownName(const FieldPath& field, const std::string& name, const char* kind,
@@ -276,8 +276,8 @@ void ResolvedProblem::Resolver::ResolveFixed() {
     const FieldPath field{"fixed", FieldStep::Key(name)};
     const auto index = Find(field, name);
     if (!index) continue;
-    if (!(std::abs(value) <= kGreatestFixed)) {
-      Refuse(field, "%g must be finite and at most %g in magnitude", value, kGreatestFixed);
+    if (!(std::abs(value) <= kMaxFixed)) {
+      Refuse(field, "%g must be finite and at most %g in magnitude", value, kMaxFixed);
     }
     ResolveDelay(field, settable_[*index], value, value);
     resolved_.base_[*index] = value;

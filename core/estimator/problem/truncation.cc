@@ -1,5 +1,6 @@
 #include "core/estimator/problem/truncation.h"
 
+#include <cmath>
 #include <cstdint>
 
 namespace polyest::internal {
@@ -40,6 +41,16 @@ std::optional<Truncation> NextTruncation(const ExpansionOptions& options, int di
     if (TermCount(dimension, next, affordable) <= affordable) return next;
   }
   return std::nullopt;
+}
+
+double PointCount(const ExpansionOptions& options, double terms) {
+  return std::ceil(options.points_per_term * terms);
+}
+
+double PointCountOnPrior(const ExpansionOptions& options, int dimension,
+                         const Truncation& truncation, double terms) {
+  return options.points == PointSet::kGaussTensor ? std::pow(truncation.order + 1, dimension)
+                                                  : PointCount(options, terms);
 }
 
 }  // namespace polyest::internal

@@ -17,4 +17,10 @@ Truncation FirstTruncation(const ExpansionOptions& options, int dimension);
 std::optional<Truncation> NextTruncation(const ExpansionOptions& options, int dimension,
                                          const Truncation& present);
 
+// Returns the number of collocation points of an expansion with so many terms over a region.
+double PointCount(const ExpansionOptions& options, double terms);
+// Returns that over the whole prior, where a tensor grid may be asked for: (order + 1)ⁿ points.
+double PointCountOnPrior(const ExpansionOptions& options, int dimension,
+                         const Truncation& truncation, double terms);
+
 }  // namespace polyest::internal

@@ -13,7 +13,7 @@ namespace {
 
 // The limits between which the squares of outputs, in units of the noise, are finite numbers
 // (propagation/output_limit.h).
-constexpr double kLeastNoise = 1e-50, kGreatestNoise = 1e50;
+constexpr double kMinNoise = 1e-50, kMaxNoise = 1e50;
 
 absl::Status ValidateCorrelation(const FieldPath& noise_field, const NoiseModel& noise) {
   const auto field = [&](const char* name) { return noise_field.Then({"correlation", name}); };
@@ -52,9 +52,9 @@ absl::Status ValidateNoise(const FieldPath& field, const NoiseModel& noise) {
       return InvalidField(field.Then(name),
                           absl::StrFormat("%g must be a finite number ≥ 0", value));
     }
-    if (value == 0 || (value >= kLeastNoise && value <= kGreatestNoise)) continue;
+    if (value == 0 || (value >= kMinNoise && value <= kMaxNoise)) continue;
     return InvalidField(field.Then(name), absl::StrFormat("%g must be 0 or lie between %g and %g",
-                                                          value, kLeastNoise, kGreatestNoise));
+                                                          value, kMinNoise, kMaxNoise));
   }
   POLYEST_RETURN_IF_ERROR(ValidateCorrelation(field, noise));
   if (noise.full_scale > 0 && noise.relative_to_max == 0) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/bayes/mismatch.h"
 #include "core/common/check.h"
 #include "core/common/linear_algebra.h"
 
@@ -12,11 +13,10 @@ namespace {
 
 // The fixed point of the scale converges by the factor p/N a step, or faster.
 constexpr int kScaleSteps = 20;
-constexpr double kMinMeanSquare = 1e-24;  // of residuals that vanish, in units of the working noise
 // How far the white shares reach beyond the range in which both parts can be seen: a factor e.
 constexpr double kMargin = 1;
 // From which on the logarithm of a product is taken, so that it does not underflow.
-constexpr double kLeastProduct = 1e-150;
+constexpr double kMinProduct = 1e-150;
 
 }  // namespace
 
@@ -147,7 +147,7 @@ void CorrelationProfile::Add(double time_s, const ConstVectorRef& gradient, doub
     }
   }
   product_.array() *= innovation_.array();
-  if (product_.minCoeff() < kLeastProduct) {
+  if (product_.minCoeff() < kMinProduct) {
     log_determinant_.array() += 0.5 * product_.array().log();
     product_.setOnes();
   }

@@ -24,7 +24,7 @@ constexpr double kMaxSignalToNoise = 1e9;
 constexpr double kMinTimeS = 1e-30;
 constexpr double kMaxTimeS = 1e12;
 // A sample, or noise, below this magnitude is 0: its square would be none. No unit has such values.
-constexpr double kLeastSize = 1e-100;
+constexpr double kMinSize = 1e-100;
 
 // Returns an error that names the place by row and column, as the user knows it. `field` is
 // relative to the samples.
@@ -170,7 +170,7 @@ absl::Status SampleChecks::CheckSizes(const Samples& samples, const SampleColumn
     if (Missing(column, k) || samples.time_s[k] < problem_.used_from_s()[place]) continue;
     const double z = column.value[k];
     const double sigma = noise.StandardDeviation(z, std::max(largest_so_far, std::abs(z)));
-    if (sigma < kLeastSize) continue;
+    if (sigma < kMinSize) continue;
     POLYEST_RETURN_IF_ERROR(CheckSize(samples, column, k, noise, sigma));
   }
   return absl::OkStatus();
@@ -215,11 +215,11 @@ absl::Status SampleChecks::PlaceColumn(const Samples& samples, const SampleColum
     // Before the largest delay the sensor shows what was before the run.
     const bool before_run = samples.time_s[k] < problem_.used_from_s()[place];
     if (Missing(column, k) || !used[k] || before_run) continue;
-    const double z = std::abs(column.value[k]) < kLeastSize ? 0 : column.value[k];
+    const double z = std::abs(column.value[k]) < kMinSize ? 0 : column.value[k];
     largest = std::max(largest, std::abs(z));
     const double sigma = noise.StandardDeviation(z, largest);
     // 0 before any other value: without a size, it counts as missing.
-    if (sigma < kLeastSize) continue;
+    if (sigma < kMinSize) continue;
     POLYEST_RETURN_IF_ERROR(CheckSize(samples, column, k, noise, sigma));
     checked.values[k * width_ + place] = z;
     checked.noise[k * channels + place] = sigma;

@@ -131,7 +131,7 @@ class Outlook {
     Vector largest(m_);
     for (int i = 0; i < m_; ++i) {
       largest[i] =
-          NoiseModel::kLeastMagnitude * y(Eigen::seq(i, y.size() - 1, m_)).cwiseAbs().maxCoeff();
+          NoiseModel::kMinMagnitude * y(Eigen::seq(i, y.size() - 1, m_)).cwiseAbs().maxCoeff();
     }
     for (Eigen::Index row = 0; row < slopes.rows(); ++row) {
       const Eigen::Index i = row % m_;

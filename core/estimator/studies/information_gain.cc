@@ -27,10 +27,10 @@ InformationGain TruthDraws::Expected(const std::vector<Matrix>& information) con
   for (int draw = 0; draw < count(); ++draw) {
     const CholeskyFactor factor = FactorPrecision(information[static_cast<size_t>(draw)]);
     gain.bits += factor.HalfLogDeterminant() / std::log(2.0);
-    gain.standard_deviation += StandardDeviation(draw, factor.Lower());
+    gain.std_dev += StandardDeviation(draw, factor.Lower());
   }
   gain.bits /= count();
-  gain.standard_deviation /= count();
+  gain.std_dev /= count();
   return gain;
 }
 

@@ -95,7 +95,7 @@ absl::Status Validate(const PredictionOptions& options, const ResolvedProblem& p
                       int64_t rows) {
   POLYEST_ASSIGN_OR_RETURN(const std::vector<int> columns, ChooseOutputs(problem, options.outputs));
   POLYEST_RETURN_IF_ERROR(CheckProbabilities(options.probabilities));
-  POLYEST_RETURN_IF_ERROR(CheckRange("draws", options.draws, kLeastDraws, kMaxPredictionDraws));
+  POLYEST_RETURN_IF_ERROR(CheckRange("draws", options.draws, kMinDraws, kMaxPredictionDraws));
   POLYEST_RETURN_IF_ERROR(CheckRange("max_rows", options.max_rows, 1, kMaxPredictionRows));
   if (!std::isfinite(options.horizon_s) || options.horizon_s < 0) {
     return InvalidField("horizon_s",

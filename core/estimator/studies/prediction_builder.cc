@@ -10,6 +10,7 @@
 
 #include "core/bayes/noise.h"
 #include "core/bayes/weighted_samples.h"
+#include "core/chaos/expansion.h"
 #include "core/chaos/germ.h"
 #include "core/estimator/problem/settable_quantities.h"
 #include "core/estimator/studies/prediction_score.h"
@@ -232,7 +233,7 @@ PredictionBuilder::~PredictionBuilder() = default;
 absl::Status PredictionBuilder::Add(const TrajectoryInstant& instant, const ConstMatrixRef& values,
                                     const ConstMatrixRef& deviations) {
   const std::vector<Eigen::Index> alive = Alive(values);
-  if (std::ssize(alive) < std::max(kLeastDraws, values.rows() / 2)) {
+  if (std::ssize(alive) < std::max(kMinDraws, values.rows() / 2)) {
     return TooFewTrajectories(instant, alive.size(), values.rows());
   }
   const bool asked = instant.row < 0;

@@ -14,7 +14,7 @@
 namespace polyest::internal {
 
 // The draws that must be left at every instant.
-inline constexpr Eigen::Index kLeastDraws = 2;
+inline constexpr Eigen::Index kMinDraws = 2;
 
 // Selects the rows of an answer: at most `max_count` of `rows`, evenly spaced.
 class RowSelection {

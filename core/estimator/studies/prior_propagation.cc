@@ -23,7 +23,7 @@ Propagation EmptyPropagation(const ResolvedProblem& problem, const PropagationOp
     output.output = outputs[static_cast<size_t>(column)].name;
     output.unit = outputs[static_cast<size_t>(column)].unit;
     output.mean.resize(times);
-    output.standard_deviation.resize(times);
+    output.std_dev.resize(times);
     output.residual.resize(times);
     output.quantiles.resize(times, static_cast<Eigen::Index>(options.probabilities.size()));
     result.outputs.push_back(std::move(output));
@@ -65,7 +65,7 @@ void Describe(const ExpandedOutputs& expanded, const PropagationOptions& options
     const double standard_error = model_deviation / std::sqrt(draws);
     const bool from_draws = residual > standard_error;
     output.mean[k] = from_draws ? model.mean() : mean[column];
-    output.standard_deviation[k] = from_draws ? model_deviation : deviation[column];
+    output.std_dev[k] = from_draws ? model_deviation : deviation[column];
     output.residual[k] = from_draws ? standard_error : residual;
     output.from_draws.push_back(from_draws);
     if (!sampled) continue;

@@ -14,8 +14,8 @@ namespace polyest::internal {
 namespace {
 
 // In a linear model χ² falls by s². The model's own χ² must fall by at least this part of it.
-constexpr double kLeastGain = 0.5;
-constexpr double kLeastShift = 1;       // of an estimate, in standard deviations, to be named
+constexpr double kMinGain = 0.5;
+constexpr double kMinShift = 1;         // of an estimate, in standard deviations, to be named
 constexpr double kNearlyAsLarge = 0.9;  // times the largest score
 constexpr size_t kMaxOthers = 3;
 
@@ -40,7 +40,7 @@ std::string Others(const std::vector<ScoreTest>& scores) {
 // Returns " and k would be 3.2 standard deviations higher", or an empty text.
 std::string Shift(const ScoreTest& test, const Estimate& estimate) {
   Eigen::Index moved;
-  if (test.shifts.cwiseAbs().maxCoeff(&moved) < kLeastShift) return "";
+  if (test.shifts.cwiseAbs().maxCoeff(&moved) < kMinShift) return "";
   const double shift = test.shifts[moved];
   return absl::StrFormat(" and %s would be %.1f standard deviations %s",
                          estimate.parameters[static_cast<size_t>(moved)].name, std::abs(shift),
@@ -60,13 +60,13 @@ void AddScoreTests(const FixedValueTests& tests, Estimate& estimate) {
   if (!tests.correction) return;
   const ScoreTest& largest = tests.scores.front();
   const double gain = tests.correction->chi_squared_before - tests.correction->chi_squared;
-  if (gain < kLeastGain * largest.score * largest.score) return;
+  if (gain < kMinGain * largest.score * largest.score) return;
   const bool residuals_contradict =
       Has(estimate, {kModelMisfit, kCorrelatedResiduals, kWindowsDisagree, kInconsistentOverTime});
   const double widened = std::sqrt(tests.correction->dispersion);
   const double score = std::abs(largest.score) / widened;
   const std::string shift = Shift(largest, estimate);
-  if (score < kLeastScore || (shift.empty() && !residuals_contradict)) return;
+  if (score < kMinScore || (shift.empty() && !residuals_contradict)) return;
   const bool is_number = largest.unit.empty() || largest.unit == "1";
   const std::string unit = is_number ? "" : absl::StrCat(" ", largest.unit);
   std::string message = absl::StrFormat(
@@ -79,7 +79,7 @@ void AddScoreTests(const FixedValueTests& tests, Estimate& estimate) {
                               {kFixedValueConflict, std::move(message)});
   for (size_t i = 0; i < estimate.parameters.size(); ++i) {
     Verdict& verdict = estimate.parameters[i].verdict;
-    const bool moves = std::abs(largest.shifts[static_cast<Eigen::Index>(i)]) >= kLeastShift;
+    const bool moves = std::abs(largest.shifts[static_cast<Eigen::Index>(i)]) >= kMinShift;
     if (moves && verdict == Verdict::kIdentified) verdict = Verdict::kWeak;
   }
 }

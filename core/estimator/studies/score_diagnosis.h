@@ -12,7 +12,7 @@ namespace polyest::internal {
 bool IsWorthTesting(const Estimate& estimate);
 
 // Puts FIXED_VALUE_CONFLICT before the other diagnostics of the estimate, for the quantity with the
-// largest score s, if all of this holds. |s| ÷ √dispersion is kLeastScore at least, with the
+// largest score s, if all of this holds. |s| ÷ √dispersion is kMinScore at least, with the
 // dispersion of the residuals that the correction leaves. It lets χ² fall by half of s² at least,
 // so that the model is near enough to linear. And either residuals contradict the noise, for which
 // the quantity is then a reason, or it moves a parameter by one standard deviation or more. Such

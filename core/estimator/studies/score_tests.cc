@@ -6,6 +6,7 @@
 #include <optional>
 #include <utility>
 
+#include "core/bayes/mismatch.h"
 #include "core/common/linear_algebra.h"
 #include "core/common/status.h"
 #include "core/estimator/studies/fixed_quantities.h"
@@ -20,14 +21,14 @@ constexpr int64_t kMaxRows = 65'536;
 constexpr int64_t kFirstRows = 256;  // from which steps and the sampling interval are found
 // A difference of trajectories should be about as large as the noise, in the norm over the record:
 // far above the rounding and far below what is not linear.
-constexpr double kLeastNorm = 0.03, kMaxNorm = 30;
+constexpr double kMinNorm = 0.03, kMaxNorm = 30;
 constexpr int kMaxPasses = 4;
 // Largest distance of an estimate from the minimum of the cost, in standard deviations. It is not 0
 // where the noise's correlation is unknown, since the estimate averages over that.
 constexpr double kMaxFromMinimum = 2;
 // A quantity is not tested if the uncertain parameters can do all that it does, but for this part
 // of |g|².
-constexpr double kLeastOwn = 1e-6;
+constexpr double kMinOwn = 1e-6;
 
 bool HasPlainLikelihood(const MeasuredOutput& output) {
   return output.noise.outliers == OutlierHandling::kNone && output.noise.relative == 0;
@@ -55,7 +56,6 @@ absl::StatusOr<std::vector<ChannelNoise>> NoiseOfResiduals(const ResolvedProblem
                                                            std::vector<ChannelNoise> noise,
                                                            const Estimate& estimate,
                                                            const Stop& stop) {
-  constexpr double kLeastMeanSquare = 1e-24;  // where the residuals vanish
   const std::vector<MeasuredOutput>& measured = problem.problem().measured;
   const auto is_unknown = [](const MeasuredOutput& output) { return output.noise.unknown; };
   if (std::ranges::none_of(measured, is_unknown)) return noise;
@@ -68,7 +68,7 @@ absl::StatusOr<std::vector<ChannelNoise>> NoiseOfResiduals(const ResolvedProblem
   for (size_t c = 0; c < measured.size(); ++c) {
     const double mean_square = scatter.MeanSquare(static_cast<Eigen::Index>(c));
     if (!measured[c].noise.unknown || !std::isfinite(mean_square)) continue;
-    noise[c].scale *= std::sqrt(std::max(kLeastMeanSquare, mean_square));
+    noise[c].scale *= std::sqrt(std::max(kMinMeanSquare, mean_square));
   }
   return noise;
 }
@@ -106,7 +106,7 @@ class Neighbours {
     for (Eigen::Index i = 0; i < xi_.size(); ++i) {
       contraction[i] = estimate.parameters[static_cast<size_t>(i)].contraction;
     }
-    steps_ = kOfDeviation * contraction.cwiseMax(kLeastFactor).cwiseProduct(Deviations());
+    steps_ = kOfDeviation * contraction.cwiseMax(kMinFactor).cwiseProduct(Deviations());
     TurnInward();
   }
 
@@ -145,11 +145,11 @@ class Neighbours {
 
  private:
   static constexpr double kOfDeviation = 0.3;
-  static constexpr double kLeastFactor = 1e-6;
+  static constexpr double kMinFactor = 1e-6;
 
   static double Adapted(double step, double norm, double max_step) {
-    if (!std::isfinite(norm) || (norm >= kLeastNorm && norm <= kMaxNorm)) return step;
-    const double factor = std::clamp(1 / norm, kLeastFactor, 1 / kLeastFactor);
+    if (!std::isfinite(norm) || (norm >= kMinNorm && norm <= kMaxNorm)) return step;
+    const double factor = std::clamp(1 / norm, kMinFactor, 1 / kMinFactor);
     return std::copysign(std::min(factor * std::abs(step), max_step), step);
   }
 
@@ -209,7 +209,7 @@ class LinearTests {
   std::optional<ScoreTest> Of(const FixedQuantity& quantity, Eigen::Index place) const {
     const Vector mixed = gram_.col(place).segment(1, n_);
     const double v = gram_(place, place) - factor_.SolveLower(mixed).squaredNorm();
-    if (!(v > kLeastOwn * gram_(place, place))) return std::nullopt;
+    if (!(v > kMinOwn * gram_(place, place))) return std::nullopt;
     ScoreTest test{.name = quantity.name, .unit = quantity.unit, .value = quantity.value};
     test.score = (gram_(place, 0) - mixed.dot(to_minimum_)) / std::sqrt(v);
     test.deviation = quantity.step / std::sqrt(v);
@@ -343,7 +343,7 @@ absl::StatusOr<FixedValueTests> TestFixedQuantities(const ResolvedProblem& probl
   POLYEST_ASSIGN_OR_RETURN(tests.scores, ScoresOf(problem, store, rows, noise, estimate, stop));
   std::ranges::stable_sort(tests.scores, std::greater<>(),
                            [](const ScoreTest& score) { return std::abs(score.score); });
-  if (tests.scores.empty() || std::abs(tests.scores.front().score) < kLeastScore) return tests;
+  if (tests.scores.empty() || std::abs(tests.scores.front().score) < kMinScore) return tests;
   POLYEST_ASSIGN_OR_RETURN(
       tests.correction, Correct(problem, store, rows, noise, estimate, tests.scores.front(), stop));
   return tests;

@@ -5,8 +5,8 @@
 // estimate by many standard deviations although the residuals are hardly larger than the noise.
 //
 // At the minimum of the cost let r = (z − y)/σ be the residuals in units of their noise, S =
-// ∂(y/σ)/ ∂ξ the sensitivities to the uncertain parameters, P and b the curvature of α² J_prior and
-// minus its gradient there, A = SᵀS + P, and g = ∂(y/σ)/∂q for a fixed quantity q. Then
+// ∂(y/σ)/ ∂ξ the sensitivities to the uncertain parameters, P and b the curvature of α² J_apriori
+// and minus its gradient there, A = SᵀS + P, and g = ∂(y/σ)/∂q for a fixed quantity q. Then
 //
 //   s = gᵀ(r − S A⁻¹(Sᵀr + b)) ÷ √v,  v = gᵀg − gᵀS A⁻¹ Sᵀg,
 //
@@ -32,7 +32,7 @@
 namespace polyest::internal {
 
 // A score from which on a fixed quantity is doubted.
-inline constexpr double kLeastScore = 5;
+inline constexpr double kMinScore = 5;
 
 // What the residuals say of a fixed quantity.
 struct ScoreTest {
@@ -54,7 +54,7 @@ struct Correction {
 
 struct FixedValueTests {
   std::vector<ScoreTest> scores;         // the largest |s| first
-  std::optional<Correction> correction;  // of the first, if its |s| is kLeastScore at least
+  std::optional<Correction> correction;  // of the first, if its |s| is kMinScore at least
 };
 
 // Tests fixed quantities (fixed_quantities.h), as many as a block of trajectories has room for,

@@ -56,7 +56,7 @@ SensitivityAnalysis EmptyAnalysis(const ResolvedProblem& problem, const TimeGrid
     output.output = outputs[static_cast<size_t>(column)].name;
     output.unit = outputs[static_cast<size_t>(column)].unit;
     output.mean.resize(times);
-    output.standard_deviation.resize(times);
+    output.std_dev.resize(times);
     output.residual.resize(times);
     output.first_order = Matrix::Zero(times, problem.dimension());
     output.total = Matrix::Zero(times, problem.dimension());
@@ -80,7 +80,7 @@ void TakeIndices(const ExpandedOutputs& expanded, const TermMasks& masks,
     OutputSensitivity& output = result.outputs[static_cast<size_t>(column % m)];
     const Eigen::Index k = expanded.first_time + column / m;
     output.mean[k] = mean[column];
-    output.standard_deviation[k] = deviation[column];
+    output.std_dev[k] = deviation[column];
     output.residual[k] = std::sqrt(expanded.residual_variance[column]);
     output.first_order.row(k) = first_order.row(column);
     output.total.row(k) = total.row(column);
@@ -90,13 +90,13 @@ void TakeIndices(const ExpandedOutputs& expanded, const TermMasks& masks,
 
 double Accuracy(const ResolvedProblem& problem, const OutputSensitivity& output) {
   return kIntegrationErrors * problem.problem().integration.relative_tolerance *
-         (output.mean.cwiseAbs() + output.standard_deviation).maxCoeff();
+         (output.mean.cwiseAbs() + output.std_dev).maxCoeff();
 }
 
 // Turns Σ c_s² into S_i and T_i.
 void DivideByVariance(double accuracy, OutputSensitivity& output) {
   for (Eigen::Index k = 0; k < output.mean.size(); ++k) {
-    const double deviation = output.standard_deviation[k];
+    const double deviation = output.std_dev[k];
     if (deviation > accuracy) {
       output.first_order.row(k) /= deviation * deviation;
       output.total.row(k) /= deviation * deviation;
@@ -108,12 +108,11 @@ void DivideByVariance(double accuracy, OutputSensitivity& output) {
 }
 
 void TakeNoise(const NoiseModel* given, OutputSensitivity& output) {
-  const NoiseModel noise =
-      given != nullptr ? *given : AssumedNoise(output.mean, output.standard_deviation);
+  const NoiseModel noise = given != nullptr ? *given : AssumedNoise(output.mean, output.std_dev);
   output.noise.resize(output.mean.size());
   // An output at rest has the noise of a small part of its later range.
-  double largest = NoiseModel::kLeastMagnitude *
-                   (output.mean.cwiseAbs() + 2 * output.standard_deviation).maxCoeff();
+  double largest =
+      NoiseModel::kMinMagnitude * (output.mean.cwiseAbs() + 2 * output.std_dev).maxCoeff();
   for (Eigen::Index k = 0; k < output.mean.size(); ++k) {
     largest = std::max(largest, std::abs(output.mean[k]));
     // An output that is always 0 has no noise to be compared with; any positive value does.
@@ -140,7 +139,7 @@ void RankParameters(SensitivityAnalysis& result) {
   Vector peaks = Vector::Zero(n);
   double all = 0;
   for (const OutputSensitivity& output : result.outputs) {
-    const Vector variance = output.standard_deviation.cwiseQuotient(output.noise).cwiseAbs2();
+    const Vector variance = output.std_dev.cwiseQuotient(output.noise).cwiseAbs2();
     const Matrix of_parameter = variance.asDiagonal() * output.total;
     all += weights.dot(variance);
     shares += of_parameter.transpose() * weights;

@@ -2,9 +2,9 @@
 
 // What the estimator answers.
 //
-// The cost of parameter values is J = J_mismatch + α² J_prior: J_mismatch is half the sum of
-// squared residuals in units of their noise, J_prior the negative logarithm of the prior's density,
-// and e^{−J} is the posterior density up to a factor (α² = 1).
+// The cost of parameter values is J = J_mismatch + α² J_apriori: J_mismatch is half the sum of
+// squared residuals in units of their noise, J_apriori the negative logarithm of the prior's
+// density, and e^{−J} is the posterior density up to a factor (α² = 1).
 
 #include <cstdint>
 #include <optional>
@@ -21,7 +21,7 @@ struct CostValue {
   // J_mismatch; ≥ 0 with noise of known size, of any sign where its size is a parameter or is
   // marginalized, since a logarithm of it is then part of the likelihood.
   double mismatch = 0;
-  double prior = 0;  // J_prior, not yet weighted; +∞ outside the prior's support
+  double prior = 0;  // J_apriori, not yet weighted; +∞ outside the prior's support
   double total = 0;  // mismatch + α² prior
 };
 

@@ -45,8 +45,8 @@ struct ExperimentOptions {
 
 // What samples are expected to tell.
 struct InformationGain {
-  double bits = 0;            // ≥ 0
-  Vector standard_deviation;  // expected afterwards, of each uncertain parameter in its unit
+  double bits = 0;  // ≥ 0
+  Vector std_dev;   // expected afterwards, of each uncertain parameter in its unit
 };
 
 // What samples of one output at all times are expected to tell.

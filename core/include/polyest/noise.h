@@ -58,12 +58,12 @@ struct NoiseModel {
 
   // The least magnitude that counts in `relative`, as a fraction of max |z|: samples at the zeros
   // of a signal are not arbitrarily accurate.
-  static constexpr double kLeastMagnitude = 1e-4;
+  static constexpr double kMinMagnitude = 1e-4;
 
   // Returns σ of a sample z. `largest_magnitude`: max |z| so far, this sample included.
   double StandardDeviation(double z, double largest_magnitude) const {
     if (unknown && absolute == 0 && relative == 0 && relative_to_max == 0) return 1;
-    const double magnitude = std::max(std::abs(z), kLeastMagnitude * largest_magnitude);
+    const double magnitude = std::max(std::abs(z), kMinMagnitude * largest_magnitude);
     const double scale = full_scale > 0 ? full_scale : largest_magnitude;
     return std::max(least, absolute + relative * magnitude + relative_to_max * scale);
   }

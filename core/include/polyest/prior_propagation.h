@@ -55,11 +55,11 @@ struct PropagationOptions {
 
 // One output over time, in its unit.
 struct PropagatedOutput {
-  std::string output;         // its name
-  std::string unit;           // "1" for a plain number; empty: the equations give none
-  Vector mean;                // one for each time
-  Vector standard_deviation;  // one for each time
-  Matrix quantiles;           // times × probabilities
+  std::string output;  // its name
+  std::string unit;    // "1" for a plain number; empty: the equations give none
+  Vector mean;         // one for each time
+  Vector std_dev;      // one for each time
+  Matrix quantiles;    // times × probabilities
   // The error of the numbers above, one for each time: the root mean square of model − expansion at
   // the draws of the prior, or the standard error of the draws' mean where they are of the draws.
   Vector residual;

@@ -92,7 +92,7 @@ struct Problem {
   // kFixed.
   std::optional<LikelihoodForm> likelihood;
   ExpansionOptions expansion;  // how the outputs are expanded
-  double regularization = 1;   // α² ≥ 0 of the cost J_mismatch + α² J_prior
+  double regularization = 1;   // α² ≥ 0 of the cost J_mismatch + α² J_apriori
   RegularizationMode regularization_mode = RegularizationMode::kFixed;  // how α² is chosen
   IntegrationOptions integration;  // how trajectories are integrated
   // Whether integration.relative_tolerance is tightened, down to 1e-12, where the noise of the

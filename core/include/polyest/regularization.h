@@ -1,9 +1,9 @@
 #pragma once
 
-// The minima of the cost J_mismatch + α² J_prior for several regularization weights α², and the α²
-// that the rules of RegularizationMode choose. Estimator::CurrentRegularizationSweep computes them
-// all on one expansion, where the posterior of α² = 1 is. An α² that pulls the minimum out of the
-// region in which the expansion is trusted has no point, and the rules leave it out. (A fixed
+// The minima of the cost J_mismatch + α² J_apriori for several regularization weights α², and the
+// α² that the rules of RegularizationMode choose. Estimator::CurrentRegularizationSweep computes
+// them all on one expansion, where the posterior of α² = 1 is. An α² that pulls the minimum out of
+// the region in which the expansion is trusted has no point, and the rules leave it out. (A fixed
 // expansion, ExpansionOptions::adaptive = false, reaches farther and is less exact.)
 
 #include <absl/status/status.h>

@@ -52,10 +52,10 @@ struct SensitivityOptions {
 // One output over time, in its unit. Vectors have one entry for each time, matrices are times ×
 // parameters.
 struct OutputSensitivity {
-  std::string output;         // its name
-  std::string unit;           // "1" for a plain number; empty: the equations give none
-  Vector mean;                // under the prior
-  Vector standard_deviation;  // √V
+  std::string output;  // its name
+  std::string unit;    // "1" for a plain number; empty: the equations give none
+  Vector mean;         // under the prior
+  Vector std_dev;      // √V
   // S_i, 0 … 1; 0 where the output does not vary: where √V is no more than an error of the
   // integration, ten times its relative tolerance of the output's largest magnitude.
   Matrix first_order;

@@ -10,7 +10,7 @@ namespace {
 
 void ToProto(const InformationGain& gain, v1::ComputeExperimentDesignResponse::Gain& proto) {
   proto.set_bits(gain.bits);
-  proto.mutable_std_dev()->Add(gain.standard_deviation.begin(), gain.standard_deviation.end());
+  proto.mutable_std_dev()->Add(gain.std_dev.begin(), gain.std_dev.end());
 }
 
 void ToProto(const OutputGain& output, v1::ComputeExperimentDesignResponse::Output& proto) {

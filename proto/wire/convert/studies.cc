@@ -11,7 +11,7 @@ void ToProto(const PropagatedOutput& output, v1::ComputePropagationResponse::Out
   proto.set_name(output.output);
   proto.set_unit(output.unit);
   Append(output.mean, *proto.mutable_mean());
-  Append(output.standard_deviation, *proto.mutable_std_dev());
+  Append(output.std_dev, *proto.mutable_std_dev());
   Append(output.quantiles, *proto.mutable_quantiles());
   Append(output.residual, *proto.mutable_residual());
   proto.mutable_from_draws()->Add(output.from_draws.begin(), output.from_draws.end());
@@ -26,7 +26,7 @@ void ToProto(const OutputSensitivity& output, v1::ComputeSensitivityResponse::Ou
   proto.set_name(output.output);
   proto.set_unit(output.unit);
   Append(output.mean, *proto.mutable_mean());
-  Append(output.standard_deviation, *proto.mutable_std_dev());
+  Append(output.std_dev, *proto.mutable_std_dev());
   Append(output.first_order, *proto.mutable_first_order());
   Append(output.total, *proto.mutable_total());
   Append(output.residual, *proto.mutable_residual());

@@ -15,16 +15,16 @@
 namespace polyest::internal {
 
 inline constexpr int kDefaultPageSize = 50;
-inline constexpr int kLargestPageSize = 200;
+inline constexpr int kMaxPageSize = 200;
 
-// Returns the number of entries that a page may have: `requested`, but at most kLargestPageSize;
+// Returns the number of entries that a page may have: `requested`, but at most kMaxPageSize;
 // kDefaultPageSize for 0. Refuses a negative number with INVALID_ARGUMENT.
 inline absl::StatusOr<size_t> PageSize(int requested) {
   if (requested < 0) {
     return InvalidField("pageSize", absl::StrCat(requested, " must not be negative"));
   }
   if (requested == 0) return static_cast<size_t>(kDefaultPageSize);
-  return static_cast<size_t>(std::min(requested, kLargestPageSize));
+  return static_cast<size_t>(std::min(requested, kMaxPageSize));
 }
 
 // Returns the error for a token that does not belong to a page.

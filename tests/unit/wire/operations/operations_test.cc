@@ -110,7 +110,7 @@ TEST(PropagationToProto, IsRowMajorAndTellsOfFailures) {
       {.output = "x",
        .unit = "m",
        .mean = (Vector(2) << 1, 2).finished(),
-       .standard_deviation = (Vector(2) << 3, 4).finished(),
+       .std_dev = (Vector(2) << 3, 4).finished(),
        .quantiles = (Matrix(2, 2) << 5, 6, 7, 8).finished(),
        .residual = (Vector(2) << 9, 10).finished(),
        .from_draws = {false, true},

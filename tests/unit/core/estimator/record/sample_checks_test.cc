@@ -113,7 +113,7 @@ TEST_F(SampleChecksTest, TakeValuesOfZeroBeforeAnyOtherForMissing) {
     EXPECT_TRUE(std::isnan(RowValues(checked, 0)[1]));
     EXPECT_DOUBLE_EQ(RowNoise(checked, 1)[1], 2 * unit);
     // Later the zeros have the noise of a small part of the range.
-    EXPECT_DOUBLE_EQ(RowNoise(checked, 2)[1], 2 * NoiseModel::kLeastMagnitude * unit);
+    EXPECT_DOUBLE_EQ(RowNoise(checked, 2)[1], 2 * NoiseModel::kMinMagnitude * unit);
     EXPECT_EQ(RowValues(checked, 2)[1], 0);
   }
 }

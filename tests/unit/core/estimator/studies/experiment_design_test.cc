@@ -40,8 +40,8 @@ TEST(ExperimentDesign, OfALinearModelIsKalmansUpdate) {
   const ExperimentDesign design = Design(Line(), 2, 0.5);
   const Eigen::Matrix2d after = LineCovariance({0, 0.5, 1, 1.5, 2});
   EXPECT_NEAR(design.gain.bits, LineBits(after), 1e-7);
-  EXPECT_NEAR(design.gain.standard_deviation[0], std::sqrt(after(0, 0)), 1e-7);
-  EXPECT_NEAR(design.gain.standard_deviation[1], std::sqrt(after(1, 1)), 1e-7);
+  EXPECT_NEAR(design.gain.std_dev[0], std::sqrt(after(0, 0)), 1e-7);
+  EXPECT_NEAR(design.gain.std_dev[1], std::sqrt(after(1, 1)), 1e-7);
   EXPECT_THAT(design.diagnostics, IsEmpty());
 }
 
@@ -68,7 +68,7 @@ TEST(ExperimentDesign, TakesTheBestTimesOneAfterTheOther) {
     const SampleTime& sample = design.samples[static_cast<size_t>(step)];
     EXPECT_EQ(sample.time_s, best);
     EXPECT_NEAR(sample.gain.bits, best_bits, 1e-7);
-    EXPECT_NEAR(sample.gain.standard_deviation[1], std::sqrt(LineCovariance(chosen)(1, 1)), 1e-7);
+    EXPECT_NEAR(sample.gain.std_dev[1], std::sqrt(LineCovariance(chosen)(1, 1)), 1e-7);
   }
   EXPECT_THAT(chosen, ElementsAre(2, 0, 1.5));
 }
@@ -88,8 +88,8 @@ TEST(ExperimentDesign, ComparesOutputsAloneAndTogether) {
   EXPECT_FALSE(v.measured);
   EXPECT_NEAR(v.noise, 0.1, 1e-12);
   EXPECT_NEAR(v.alone.bits, 0.5 * std::log2(9 * (1.0 / 9 + 500)), 1e-7);
-  EXPECT_NEAR(v.alone.standard_deviation[0], 2, 1e-7);
-  EXPECT_NEAR(v.alone.standard_deviation[1], 1 / std::sqrt(1.0 / 9 + 500), 1e-9);
+  EXPECT_NEAR(v.alone.std_dev[0], 2, 1e-7);
+  EXPECT_NEAR(v.alone.std_dev[1], 1 / std::sqrt(1.0 / 9 + 500), 1e-9);
   Eigen::Matrix2d precision = LineCovariance({0, 0.5, 1, 1.5, 2}).inverse();
   precision(1, 1) += 500;
   EXPECT_NEAR(v.together.bits, LineBits(precision.inverse()), 1e-7);
@@ -145,7 +145,7 @@ TEST(ExperimentDesign, KeepsThePriorOfWhatIsNotSeen) {
                 {Normal("a", 0, 1), UncertainParameter::Lognormal("b", 3, 2).value()});
   problem.measured = {{"y", {.absolute = 0.1}}};
   const ExperimentDesign design = Design(problem, 1, 1, 5);
-  EXPECT_NEAR(design.gain.standard_deviation[1], 2, 1e-6);
+  EXPECT_NEAR(design.gain.std_dev[1], 2, 1e-6);
   EXPECT_EQ(design.samples.size(), 2u);
 }
 
@@ -217,8 +217,8 @@ TEST(ExperimentDesign, FollowsTheModelOverALongTime) {
 TEST(ExperimentDesign, TellsNoParametersApartThatTheModelCannot) {
   const ExperimentDesign design =
       Design(FreeVibration({Normal("m", 1, 0.1), Normal("k", 40, 4)}), 20, 0.1);
-  EXPECT_NEAR(design.gain.standard_deviation[0], 0.1 / std::sqrt(2), 0.05 * 0.1);
-  EXPECT_NEAR(design.gain.standard_deviation[1], 4 / std::sqrt(2), 0.05 * 4);
+  EXPECT_NEAR(design.gain.std_dev[0], 0.1 / std::sqrt(2), 0.05 * 0.1);
+  EXPECT_NEAR(design.gain.std_dev[1], 4 / std::sqrt(2), 0.05 * 4);
 }
 
 // A trajectory that leaves for infinity before the end takes its draw along.

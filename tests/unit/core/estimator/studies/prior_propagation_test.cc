@@ -37,7 +37,7 @@ TEST(PropagatePrior, HasTheClosedFormOfALinearModel) {
     const double t = result.time_s[static_cast<size_t>(k)];
     // The integrator is exact on x = a t, except for rounding.
     EXPECT_NEAR(x.mean[k], 2 * t, 1e-9);
-    EXPECT_NEAR(x.standard_deviation[k], t / std::sqrt(3.0), 1e-9);
+    EXPECT_NEAR(x.std_dev[k], t / std::sqrt(3.0), 1e-9);
     EXPECT_NEAR(x.residual[k], 0, 1e-9);
     EXPECT_FALSE(x.from_draws[static_cast<size_t>(k)]);
     // The error of 10,000 low-discrepancy draws is about a thousandth.
@@ -102,7 +102,7 @@ TEST(PropagatePrior, LeavesOutPointsThatFailWhileEnoughRemain) {
   }
   // The model is linear, so that the remaining points still determine it.
   EXPECT_NEAR(result.outputs[0].mean[4], 4, 1e-6);
-  EXPECT_NEAR(result.outputs[0].standard_deviation[4], 2 / std::sqrt(3.0), 1e-6);
+  EXPECT_NEAR(result.outputs[0].std_dev[4], 2 / std::sqrt(3.0), 1e-6);
 }
 
 TEST(PropagatePrior, RefusesWhenTooFewPointsRemainAndNamesAFailure) {
@@ -183,7 +183,7 @@ TEST(PropagatePrior, HasTheClosedFormOfAnOscillationWhosePhaseIsUncertain) {
       // Four standard errors. That of a standard deviation is √((μ₄/σ⁴ − 1)/N)/2 of it, at most
       // that of the mean while μ₄ ≤ 5 σ⁴.
       EXPECT_NEAR(y.mean[k], mean, 4 * y.residual[k]) << t;
-      EXPECT_NEAR(y.standard_deviation[k], std::sqrt(square - mean * mean), 4 * y.residual[k]) << t;
+      EXPECT_NEAR(y.std_dev[k], std::sqrt(square - mean * mean), 4 * y.residual[k]) << t;
     }
   }
 }
@@ -224,7 +224,7 @@ TEST(PropagatePrior, IsQuadratureForALongTail) {
     const Propagation result = PropagatePrior(Resolve(problem), UntilTwo(), {}).value();
     const PropagatedOutput& y = result.outputs[0];
     EXPECT_NEAR(y.mean[4], mean, 4 * y.residual[4]) << order;
-    EXPECT_NEAR(y.standard_deviation[4], std::sqrt(square - mean * mean), 4 * y.residual[4]);
+    EXPECT_NEAR(y.std_dev[4], std::sqrt(square - mean * mean), 4 * y.residual[4]);
     EXPECT_GE(y.quantiles(4, 0), 0) << order;
     EXPECT_LE(y.quantiles(4, 2), 1) << order;
   }

@@ -61,7 +61,7 @@ TEST(Sensitivity, HasTheClosedFormOfAPolynomialOfUniformParameters) {
   EXPECT_THAT(result.parameters, ElementsAre("a", "b"));
   const OutputSensitivity& y = result.outputs[0];
   for (int k = 0; k < 2; ++k) {
-    EXPECT_NEAR(y.standard_deviation[k], std::sqrt(103.0) / 12, 1e-12);
+    EXPECT_NEAR(y.std_dev[k], std::sqrt(103.0) / 12, 1e-12);
     EXPECT_NEAR(y.first_order(k, 0), 27.0 / 103, 1e-12);
     EXPECT_NEAR(y.first_order(k, 1), 75.0 / 103, 1e-12);
     EXPECT_NEAR(y.total(k, 0), 28.0 / 103, 1e-12);
@@ -82,7 +82,7 @@ TEST(Sensitivity, HasTheClosedFormOfAProductOfNormalAndGammaParameters) {
       Analyze(ProblemOf({.outputs = {{"y", "a*b"}}},
                         {Normal("a", 2, 1), UncertainParameter::Gamma("b", 4, 0.5, 0).value()}));
   const OutputSensitivity& y = result.outputs[0];
-  EXPECT_NEAR(y.standard_deviation[0], 3, 1e-9);
+  EXPECT_NEAR(y.std_dev[0], 3, 1e-9);
   EXPECT_NEAR(y.first_order(0, 0), 4.0 / 9, 1e-9);
   EXPECT_NEAR(y.first_order(0, 1), 4.0 / 9, 1e-9);
   EXPECT_NEAR(y.total(0, 0), 5.0 / 9, 1e-9);
@@ -144,7 +144,7 @@ TEST(Activity, DoesNotDependOnTheUnitsOfOutputsThatAreNotMeasured) {
     const SensitivityAnalysis result = Analyze(
         ProblemOf({.outputs = {{"p", p}, {"q", q}}}, {Normal("a", 1, 1), Normal("b", 1, 0.3)}));
     // The noise is 1 % of the range mean ± 2 standard deviations.
-    EXPECT_NEAR(result.outputs[0].noise[0], 0.04 * result.outputs[0].standard_deviation[0], 1e-12);
+    EXPECT_NEAR(result.outputs[0].noise[0], 0.04 * result.outputs[0].std_dev[0], 1e-12);
     return std::vector<double>{result.activity[0].share, result.activity[1].share};
   };
   const std::vector<double> in_one_unit = shares("a*b", "a + b");
