@@ -13,6 +13,7 @@
 #include "core/estimator/expansion/likelihood_power.h"
 #include "core/estimator/expansion/model_agreement.h"
 #include "core/estimator/expansion/search_domain.h"
+#include "core/estimator/posterior/believed_minimum.h"
 #include "core/estimator/posterior/channel_description.h"
 #include "core/estimator/posterior/diagnosis.h"
 #include "core/estimator/posterior/marginal_description.h"
@@ -48,6 +49,7 @@ class Assessment {
     const Cost cost = TemperedCost(stop);
     POLYEST_ASSIGN_OR_RETURN(
         posterior_, DrawPosterior(cost, design_, *request_.guesses, request_.effort, stop));
+    BeginWithBelieved(cost, design_, posterior_);
     MixtureShare share;
     findings_.not_mixed = WhyNotMixed(posterior_);
     NoteLeaning();

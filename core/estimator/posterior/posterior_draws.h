@@ -42,8 +42,10 @@ struct PosteriorDraws {
   Vector effective_size;
   // The group of Markov chains of each draw; empty for importance sampling.
   Eigen::VectorXi chain;
-  Vector r_hat;                 // per parameter, over its chains; empty for importance sampling
-  std::vector<Minimum> minima;  // distinct, local coordinates, lowest first; at least one
+  Vector r_hat;  // per parameter, over its chains; empty for importance sampling
+  // Distinct, local coordinates, at least one: lowest first, but for the one that an assessment may
+  // put before lower ones (believed_minimum.h).
+  std::vector<Minimum> minima;
 
   Vector Parameter(const Prior& prior, int i) const;  // returns the draws of θ_i
   Matrix Germs(const Prior& prior) const;             // returns the draws of ξ, draws × n
