@@ -71,7 +71,7 @@ void AddKnots(const v1::Measurements& measurements, const v1::Measurements::Chan
 }
 
 // Returns the problem with each streamed input replaced by a table of its values in the first run,
-// because the request for a design carries no data.
+// because the request for a design carries no data. Nothing is then read from columns of data.
 v1::Problem WithoutStreamedInputs(v1::Problem problem, const v1::Measurements& measurements) {
   int rows = measurements.time_s_size();
   for (int k = 0; k < measurements.run_size() && k < rows; ++k) {
@@ -96,6 +96,8 @@ v1::Problem WithoutStreamedInputs(v1::Problem problem, const v1::Measurements& m
       table.add_value(0);
     }
   }
+  problem.clear_columns();
+  problem.clear_use_when();
   return problem;
 }
 

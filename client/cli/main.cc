@@ -2,10 +2,14 @@
 
 #include <google/protobuf/stubs/logging.h>
 #include <grpc/support/log.h>
+#include <signal.h>
 #include <unistd.h>
 
+#include <cerrno>
+#include <cstring>
 #include <exception>
 #include <iostream>
+#include <string>
 #include <type_traits>
 #include <variant>
 
@@ -38,14 +42,18 @@ int Run(const std::variant<polyest::internal::CommandLine, int>& parsed) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  signal(SIGXFSZ, SIG_IGN);  // a file beyond the limit of sizes is an error of its writing
   // The libraries' own messages are suppressed: errors that matter are returned as a status.
   gpr_set_log_function([](gpr_log_func_args*) {});
   google::protobuf::SetLogHandler(nullptr);
   try {
     const int status = Run(polyest::internal::ParseArguments(argc, argv, std::cout, std::cerr));
+    errno = 0;
     std::cout.flush();
     if (status == polyest::internal::kExitOk && !std::cout) {
-      std::cerr << "polyest: the output could not be written" << std::endl;
+      // The stream may have failed before, whose reason is not known any more.
+      std::cerr << "polyest: the output could not be written"
+                << (errno != 0 ? std::string(": ") + std::strerror(errno) : "") << std::endl;
       return polyest::internal::kExitFailure;
     }
     return status;

@@ -58,6 +58,11 @@ bool PartTimeEnding(absl::string_view header, ColumnName& column) {
   return false;
 }
 
+// Whether text is a unit, but not of a time. "hh:mm:ss" and "UTC" are no units.
+bool IsUnitOfAnother(const std::string& text) {
+  return !text.empty() && CheckRecordedUnit(text).ok() && !ConvertUnit(text, "s").ok();
+}
+
 }  // namespace
 
 ColumnName ParseColumnName(absl::string_view header) {
@@ -84,6 +89,7 @@ std::string UnitOfCell(absl::string_view cell) {
 }
 
 bool IsUsualTimeName(absl::string_view name) {
+  if (name == "T") return false;  // a temperature
   return std::any_of(std::begin(kTimeNames), std::end(kTimeNames), [name](absl::string_view usual) {
     return absl::EqualsIgnoreCase(name, usual);
   });
@@ -103,7 +109,7 @@ bool MayBeTime(const ColumnName& column, const DataColumns& columns) {
   if (source != columns.sources.end() && !source->second.from.empty()) {
     return IsColumnOf(column, "t", columns);
   }
-  return IsUsualTimeName(column.name);
+  return IsUsualTimeName(column.name) && !IsUnitOfAnother(column.unit);
 }
 
 }  // namespace polyest::internal

@@ -24,7 +24,8 @@ ColumnName ParseColumnName(absl::string_view header);
 // Returns the text of a cell in a row of units without its brackets.
 std::string UnitOfCell(absl::string_view cell);
 
-// Whether a name is one of the usual names of a time: t, time, timestamp, Zeit, … in any case.
+// Whether a name is one of the usual names of a time: t, time, timestamp, Zeit, … in any case, but
+// for T, which is a temperature.
 bool IsUsualTimeName(absl::string_view name);
 
 // Whether a column is the source of a quantity: the one that its source names, or else the one that

@@ -103,7 +103,9 @@ TEST_F(ExplainTest, NamesTheOutputToAddWhereTheInputIsStreamed) {
     "measured": [{"output": "x1_minus_x2", "noise": {"absolute": 0.01}}],
     "inputs": [{"name": "u1", )";
   EXPECT_THAT(Explain(before + R"("step": {"amplitude": 1}}]})", {"x1_minus_x2"},
-                      before + R"("streamed": {"hold": true}}]})", "u1"),
+                      before + R"("streamed": {"hold": true}}],
+                                "columns": {"u1": {"from": "step"}}, "useWhen": "step > 0"})",
+                      "step"),
               AllOf(HasSubstr("theta is not identified"), HasSubstr("Measuring x"),
                     HasSubstr(" would determine theta to ±")));
 }
