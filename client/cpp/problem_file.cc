@@ -65,14 +65,14 @@ absl::StatusOr<v1::Problem> ParseProblem(absl::string_view json, absl::string_vi
   options.ignore_unknown_fields = false;
   const auto status =
       google::protobuf::util::JsonStringToMessage(WithoutAutomaticOrder(json), &problem, options);
-  if (status.ok()) return problem;
+  const std::string wrong = FindWrongValue(json, *v1::Problem::descriptor());
+  if (status.ok() && wrong.empty()) return problem;
   if (KindOfText(json) == FileKind::kCsv) {
     return absl::InvalidArgumentError(
         absl::StrCat(name, ": is CSV data; a problem is one JSON object"));
   }
   const auto unknown = FindUnknownFields(json, *v1::Problem::descriptor());
   if (!unknown.empty()) return UnknownFieldsError(name, unknown);
-  const std::string wrong = FindWrongValue(WithoutAutomaticOrder(json), *v1::Problem::descriptor());
   if (!wrong.empty()) return absl::InvalidArgumentError(absl::StrCat(name, ": ", wrong));
   return InFile(name, DescribeJsonError(json, {status.message().data(), status.message().size()}));
 }

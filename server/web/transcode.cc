@@ -2,17 +2,20 @@
 
 #include <absl/strings/ascii.h>
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_split.h>
 #include <google/protobuf/message.h>
 #include <google/protobuf/util/json_util.h>
 #include <google/protobuf/util/type_resolver_util.h>
 
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "proto/wire/json/json_error.h"
 #include "proto/wire/json/json_format.h"
 #include "proto/wire/json/json_structure.h"
 #include "proto/wire/json/unknown_fields.h"
+#include "proto/wire/json/wrong_values.h"
 #include "proto/wire/transport/automatic_order.h"
 #include "server/telemetry/structured_log.h"
 
@@ -22,7 +25,8 @@ namespace {
 constexpr char kPrefix[] = "type.googleapis.com";
 // No more unknown fields than these are named.
 constexpr size_t kMaxNamed = 10;
-// Longest text in which all unknown fields are looked for, which takes many times its size.
+// Longest text in which unknown fields and wrong values are looked for, which takes many times its
+// size. Longer ones carry measurements.
 constexpr size_t kMaxSearched = size_t{1} << 20;
 
 google::protobuf::util::TypeResolver& Types() {
@@ -44,6 +48,23 @@ rpc::Status InBody(const JsonError& error) {
   return Invalid(absl::StrCat("line ", error.line, " of the body: ", error.what));
 }
 
+// Adds the fields that are wrong, as google.rpc.BadRequest, to a status.
+rpc::Status WithDetails(rpc::Status status, const rpc::BadRequest& details) {
+  auto& any = *status.add_details();
+  any.set_type_url("type.googleapis.com/google.rpc.BadRequest");
+  details.SerializeToString(any.mutable_value());
+  return status;
+}
+
+// `wrong` is "field: value and rule".
+rpc::Status WrongValue(const std::string& wrong) {
+  const std::pair<std::string, std::string> parts = absl::StrSplit(wrong, absl::MaxSplits(": ", 1));
+  rpc::BadRequest details;
+  details.add_field_violations()->set_field(parts.first);
+  details.mutable_field_violations(0)->set_description(parts.second);
+  return WithDetails(Invalid(wrong), details);
+}
+
 rpc::Status UnknownFields(const std::vector<UnknownField>& fields) {
   rpc::BadRequest details;
   std::string message;
@@ -55,11 +76,7 @@ rpc::Status UnknownFields(const std::vector<UnknownField>& fields) {
     violation.set_description(sentence);
     absl::StrAppend(&message, i == 0 ? "" : ", ", fields[i].path, ": ", sentence);
   }
-  rpc::Status status = Invalid(message);
-  auto& any = *status.add_details();
-  any.set_type_url("type.googleapis.com/google.rpc.BadRequest");
-  details.SerializeToString(any.mutable_value());
-  return status;
+  return WithDetails(Invalid(message), details);
 }
 
 }  // namespace
@@ -73,10 +90,14 @@ rpc::Status FromJsonText(const std::string& json, const google::protobuf::Descri
   const auto read = google::protobuf::util::JsonToBinaryString(
       &Types(), absl::StrCat(kPrefix, "/", type.full_name()), WithoutAutomaticOrders(json), &bytes,
       options);
-  if (read.ok()) return {};
-  std::vector<UnknownField> unknown;
-  if (json.size() <= kMaxSearched) unknown = FindUnknownFields(json, type);
-  if (!unknown.empty()) return UnknownFields(unknown);
+  const bool searched = json.size() <= kMaxSearched;
+  const std::string wrong = searched ? FindWrongValue(json, type) : "";
+  if (read.ok() && wrong.empty()) return {};
+  if (searched && !read.ok()) {
+    const std::vector<UnknownField> unknown = FindUnknownFields(json, type);
+    if (!unknown.empty()) return UnknownFields(unknown);
+  }
+  if (!wrong.empty()) return WrongValue(wrong);
   return InBody(DescribeJsonError(json, {read.message().data(), read.message().size()}));
 }
 

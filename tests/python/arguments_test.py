@@ -79,6 +79,9 @@ def test_a_long_table_is_looked_through_in_a_moment(problem):
 def test_a_check_lists_values_of_a_wrong_form_and_bad_data(client, problem, tmp_path):
     wrong = client.check({"model": {"builtin": "duffing"}, "fixed": {"m": "heavy"}})
     assert [str(one) for one in wrong.errors] == ['fixed.m: "heavy" must be a number']
+    lost = client.check({"uncertain": [{"name": "k", "uniform": {"lower": None, "upper": 2}}]})
+    assert [str(one) for one in lost.errors] == [
+        "uncertain[0].uniform.lower: null must be a number"]
     both = client.check(problem.copy().fix(k=1.0), {"t": [0.0, 1.0], "x": [0.0, np.inf]})
     assert [one.field for one in both.errors] == ["uncertain[0]", "x"]
     assert "inf is not finite" in str(both.errors[1]) and both.summary == []

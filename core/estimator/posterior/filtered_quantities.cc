@@ -11,8 +11,8 @@
 namespace polyest::internal {
 namespace {
 
-constexpr int kNodes = 7;      // of the rule that integrates over each normal distribution
-constexpr int kMaxSteps = 60;  // to find a quantile
+constexpr int kNodes = 7;              // of the rule that integrates over each normal distribution
+constexpr int kMaxQuantileSteps = 60;  // to find a quantile
 // Standard deviations from a mean, beyond which nothing is looked for.
 constexpr double kFarthest = 6;
 // Error of a quantile, in the width of the mixture.
@@ -58,7 +58,7 @@ struct Mixture {
     double upper = (mean + kFarthest * deviation).maxCoeff();
     const double error = kQuantileError * (upper - lower);
     double x = lower + 0.5 * (upper - lower);
-    for (int step = 0; step < kMaxSteps && upper - lower > error; ++step) {
+    for (int step = 0; step < kMaxQuantileSteps && upper - lower > error; ++step) {
       const Below below = At(x);
       (below.probability < probability ? lower : upper) = x;
       const double next = x - (below.probability - probability) / below.density;

@@ -49,12 +49,13 @@ std::string Shown(const Value& value) {
   return "null";
 }
 
-// Returns the number that a value stands for, if any. Protobuf also takes "1.5".
+// Returns the number that a value stands for, if any. Protobuf also takes "1.5", but not " 1.5".
 std::optional<double> NumberIn(const Value& value) {
   double number = value.number_value();
   if (value.has_number_value()) return number;
-  if (!value.has_string_value()) return std::nullopt;
-  return absl::SimpleAtod(value.string_value(), &number) ? std::optional(number) : std::nullopt;
+  const std::string& text = value.string_value();
+  if (!value.has_string_value() || text != absl::StripAsciiWhitespace(text)) return std::nullopt;
+  return absl::SimpleAtod(text, &number) ? std::optional(number) : std::nullopt;
 }
 
 // The rules below return what a value must be; an empty text if it is that.
@@ -87,7 +88,15 @@ std::string RuleOfBool(const Value& value) {
   return value.has_bool_value() || is_text ? "" : "true or false";
 }
 
+// Returns the rule of expansion.order, for which a word stands, too (automatic_order.h).
+std::string RuleOfOrder(const Value& value) {
+  if (value.string_value() == "AUTO") return "";
+  const std::string rule = RuleOfWhole(0x1p31, value);
+  return value.has_string_value() && !rule.empty() ? "a whole number or \"AUTO\"" : rule;
+}
+
 std::string RuleOf(const FieldDescriptor& field, const Value& value) {
+  if (field.full_name() == "polyest.v1.ExpansionOptions.order") return RuleOfOrder(value);
   switch (field.cpp_type()) {
     case FieldDescriptor::CPPTYPE_INT32:
       return RuleOfWhole(0x1p31, value);
@@ -118,7 +127,7 @@ class Search {
     std::map<const OneofDescriptor*, std::string> given;
     for (const auto& [name, value] : fields) {
       const FieldDescriptor* const field = FindField(message, name);
-      if (field == nullptr || value.has_null_value()) continue;
+      if (field == nullptr || (value.has_null_value() && MayBeNull(*field))) continue;
       if (const OneofDescriptor* const choice = field->real_containing_oneof()) {
         const auto [first, is_first] = given.emplace(choice, name);
         if (!is_first) return RefuseBoth(*choice, first->second, name, prefix);
@@ -131,6 +140,12 @@ class Search {
   std::string Take() { return std::move(wrong_); }
 
  private:
+  // Whether null stands for a field that is not given, as in protobuf. In place of a number it is a
+  // number that has been lost: programs write NaN so.
+  static bool MayBeNull(const FieldDescriptor& field) {
+    return field.is_repeated() || field.message_type() != nullptr;
+  }
+
   static const FieldDescriptor* FindField(const Descriptor& message, absl::string_view name) {
     for (int i = 0; i < message.field_count(); ++i) {
       const FieldDescriptor& field = *message.field(i);
@@ -154,8 +169,6 @@ class Search {
   void WalkField(const Value& value, const FieldDescriptor& field, const std::string& path) {
     if (field.is_map()) return WalkMap(value, field, path);
     if (!field.is_repeated()) return WalkValue(value, field, path);
-    // Protobuf takes an object for a list of one.
-    if (value.has_struct_value()) return WalkValue(value, field, path);
     if (!value.has_list_value()) return Refuse(path, value, "a list, in brackets [ ]");
     for (int i = 0; i < value.list_value().values_size() && wrong_.empty(); ++i) {
       WalkValue(value.list_value().values(i), field, absl::StrCat(path, "[", i, "]"));
@@ -167,7 +180,7 @@ class Search {
     const std::map<std::string, Value> entries(value.struct_value().fields().begin(),
                                                value.struct_value().fields().end());
     for (const auto& [key, entry] : entries) {
-      if (!entry.has_null_value() && wrong_.empty()) {
+      if (wrong_.empty()) {
         WalkValue(entry, *field.message_type()->map_value(), absl::StrCat(path, ".", key));
       }
     }

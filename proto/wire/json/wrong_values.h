@@ -1,7 +1,8 @@
 #pragma once
 
-// Finds a value of a JSON text that its protobuf message cannot take, and says in plain words what
-// it must be. Protobuf's own words for it name its internal types.
+// Finds a value of a JSON text that its protobuf message should not take, and says in plain words
+// what it must be. Protobuf's own words for it name its internal types, and some values it takes
+// for others: null for 0, "0x10" for 16, "yes" for true, an object for a list of one.
 
 #include <absl/strings/string_view.h>
 #include <google/protobuf/descriptor.h>

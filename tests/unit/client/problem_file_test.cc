@@ -96,6 +96,24 @@ TEST(ParseProblem, NamesAFieldOfTheWrongType) {
             "problem.json: uncertain[0].uniform: 5 must be an object, in braces { }");
 }
 
+// Protobuf would take each of them for another value.
+TEST(ParseProblem, RefusesALostNumberAndOtherTypes) {
+  EXPECT_EQ(ErrorOf(R"({"fixed": {"x0": null}})"), "problem.json: fixed.x0: null must be a number");
+  EXPECT_EQ(ErrorOf(R"({"uncertain": [{"uniform": {"lower": null, "upper": 2}}]})"),
+            "problem.json: uncertain[0].uniform.lower: null must be a number");
+  EXPECT_EQ(ErrorOf(R"({"uncertain": [{"perRun": "yes"}]})"),
+            "problem.json: uncertain[0].perRun: \"yes\" must be true or false");
+  EXPECT_EQ(ErrorOf(R"({"measured": [{"noise": {"absolute": "0x10"}}]})"),
+            "problem.json: measured[0].noise.absolute: \"0x10\" must be a number");
+  EXPECT_EQ(ErrorOf(R"({"measured": [{"noise": {"absolute": " 0.01 "}}]})"),
+            "problem.json: measured[0].noise.absolute: \" 0.01 \" must be a number");
+  EXPECT_EQ(ErrorOf(R"({"measured": {"output": "x"}})"),
+            "problem.json: measured: an object must be a list, in brackets [ ]");
+  EXPECT_EQ(ErrorOf(R"({"expansion": {"order": "auto"}})"),
+            "problem.json: expansion.order: \"auto\" must be a whole number or \"AUTO\"");
+  EXPECT_TRUE(ParseProblem(R"({"measured": null, "expansion": {"order": "AUTO"}})", "p").ok());
+}
+
 TEST(ParseProblem, NamesTheWordsThatAFieldTakes) {
   EXPECT_THAT(ErrorOf(R"({"expansion": {"points": "SOBOL"}})"),
               StartsWith("problem.json: expansion.points: \"SOBOL\" must be one of HALTON, "));

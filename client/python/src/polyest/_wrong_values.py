@@ -25,7 +25,7 @@ def find(document: Mapping[str, Any], message: Descriptor,
     given: dict[str, str] = {}
     for name, value in sorted(document.items()):
         field = message.fields_by_camelcase_name.get(name) or message.fields_by_name.get(name)
-        if field is None or value is None:
+        if field is None or (value is None and _may_be_null(field)):
             continue
         choice = field.containing_oneof
         if choice is not None and len(choice.fields) > 1:
@@ -44,6 +44,11 @@ def is_repeated(field: FieldDescriptor) -> bool:
     if hasattr(field, "is_repeated"):
         return bool(field.is_repeated)
     return bool(field.label == FieldDescriptor.LABEL_REPEATED)
+
+
+def _may_be_null(field: FieldDescriptor) -> bool:
+    """Whether null stands for a field that is not given. In place of a number it is a lost one."""
+    return is_repeated(field) or field.message_type is not None
 
 
 def _name(field: FieldDescriptor) -> str:
@@ -80,8 +85,8 @@ def _value(value: Any, field: FieldDescriptor, path: str) -> Optional[tuple[str,
 
 
 def _number(value: Any) -> Optional[float]:
-    """Returns the number that a value stands for; protobuf also takes "1.5"."""
-    if isinstance(value, bool):
+    """Returns the number that a value stands for; protobuf also takes "1.5", but not " 1.5"."""
+    if isinstance(value, bool) or (isinstance(value, str) and value != value.strip()):
         return None
     try:
         return float(value)

@@ -54,6 +54,18 @@ TEST(Transcode, NamesTheLineOfASyntaxError) {
   EXPECT_THAT(status.message(), HasSubstr("line 2"));
 }
 
+TEST(Transcode, RefusesALostNumberWithItsField) {
+  const rpc::Status status = Read<v1::CreateSessionRequest>(
+      R"({"session": {"problem": {"uncertain": [{"uniform": {"lower": null, "upper": 2}}]}}})");
+  EXPECT_EQ(status.code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_EQ(status.message(), "session.problem.uncertain[0].uniform.lower: null must be a number");
+  ASSERT_EQ(status.details_size(), 1);
+  rpc::BadRequest details;
+  ASSERT_TRUE(details.ParseFromString(status.details(0).value()));
+  EXPECT_EQ(details.field_violations(0).field(), "session.problem.uncertain[0].uniform.lower");
+  EXPECT_EQ(details.field_violations(0).description(), "null must be a number");
+}
+
 TEST(Transcode, NamesEveryUnknownFieldWithWhatMayBeMeant) {
   const rpc::Status status =
       Read<v1::CreateSessionRequest>(R"({"sesion_id": 1, "session": {"problem": {"fxed": {}}}})");
