@@ -104,7 +104,7 @@ TEST_F(ExplainTest, NamesTheOutputToAddWhereTheInputIsStreamed) {
     "inputs": [{"name": "u1", )";
   EXPECT_THAT(Explain(before + R"("step": {"amplitude": 1}}]})", {"x1_minus_x2"},
                       before + R"("streamed": {"hold": true}}],
-                                "columns": {"u1": {"from": "step"}}, "useWhen": "step > 0"})",
+                                "columns": {"u1": {"from": "step"}}, "useWhen": "u1 > 0"})",
                       "step"),
               AllOf(HasSubstr("theta is not identified"), HasSubstr("Measuring x"),
                     HasSubstr(" would determine theta to ±")));
