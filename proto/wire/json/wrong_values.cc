@@ -49,12 +49,14 @@ std::string Shown(const Value& value) {
   return "null";
 }
 
-// Returns the number that a value stands for, if any. Protobuf also takes "1.5", but not " 1.5".
+// Returns the number that a value stands for, if any. Protobuf also takes "1.5", but not " 1.5";
+// and "0x10", which is more likely an address than a number.
 std::optional<double> NumberIn(const Value& value) {
   double number = value.number_value();
   if (value.has_number_value()) return number;
   const std::string& text = value.string_value();
   if (!value.has_string_value() || text != absl::StripAsciiWhitespace(text)) return std::nullopt;
+  if (text.find_first_of("xX") != std::string::npos) return std::nullopt;
   return absl::SimpleAtod(text, &number) ? std::optional(number) : std::nullopt;
 }
 
