@@ -49,8 +49,8 @@ std::string Shown(const Value& value) {
   return "null";
 }
 
-// Returns the number that a value stands for, if any. Protobuf also takes "1.5", but not " 1.5";
-// and "0x10", which is more likely an address than a number.
+// Returns the number that a value stands for, if any. Protobuf also takes "1.5", but not " 1.5"; it
+// takes "0x10" for 16, too, which is no number of JSON.
 std::optional<double> NumberIn(const Value& value) {
   double number = value.number_value();
   if (value.has_number_value()) return number;
