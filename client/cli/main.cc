@@ -5,11 +5,8 @@
 #include <signal.h>
 #include <unistd.h>
 
-#include <cerrno>
-#include <cstring>
 #include <exception>
 #include <iostream>
-#include <string>
 #include <type_traits>
 #include <variant>
 
@@ -48,12 +45,9 @@ int main(int argc, char** argv) {
   google::protobuf::SetLogHandler(nullptr);
   try {
     const int status = Run(polyest::internal::ParseArguments(argc, argv, std::cout, std::cerr));
-    errno = 0;
     std::cout.flush();
     if (status == polyest::internal::kExitOk && !std::cout) {
-      // The stream may have failed before, whose reason is not known any more.
-      std::cerr << "polyest: the output could not be written"
-                << (errno != 0 ? std::string(": ") + std::strerror(errno) : "") << std::endl;
+      std::cerr << "polyest: the output could not be written" << std::endl;
       return polyest::internal::kExitFailure;
     }
     return status;

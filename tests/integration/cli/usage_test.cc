@@ -134,7 +134,7 @@ TEST_F(UsageTest, SaysThatTheHelpCouldNotBeWritten) {
     const Finished run =
         RunProgram({"/bin/sh", "-c", std::string(POLYEST_PROGRAM) + " " + words + " >/dev/full"});
     EXPECT_EQ(run.exit_status, 1) << words;
-    EXPECT_EQ(run.err, "polyest: the output could not be written: No space left on device\n");
+    EXPECT_EQ(run.err, "polyest: the output could not be written\n");
   }
 }
 
