@@ -253,11 +253,8 @@ RunPath Elimination::PathFound() const {
   path.slope = path_.slope + box * follows * Inverse(ended_.region.axes());
   FreeOfPopulation(problem_, path.slope);
   const Vector unit = problem_.prior().GermStandardDeviation()(own_);
-  Matrix covariance = box * inverse * box.transpose();
-  // Never wider than the prior: where it is, the integrand is not a Gaussian.
-  const Vector most = unit.cwiseQuotient(covariance.diagonal().cwiseSqrt()).cwiseMin(1);
-  covariance = most.asDiagonal() * covariance * most.asDiagonal();
-  path.spread = SpreadOf(covariance, unit);
+  // Where it is wider than the prior, the integrand is not a Gaussian.
+  path.spread = SpreadOf(NoWiderThan(unit, box * inverse * box.transpose()), unit);
   if (score_) SetScore(problem_, score_->posterior(), path);
   return path;
 }
@@ -366,8 +363,8 @@ absl::Status Elimination::AddTo(const RunPath& path, const Stop& stop, EndedRuns
                          end_s_);
   } else {
     TellPopulation(problem_, cost, path, *score_, ended);
-    if (expansion_->absorbed().OwnError() > kMaxOwnError)
-      ended.unresolved += expansion_->absorbed().OwnError();
+    const double own_error = expansion_->absorbed().OwnError();
+    if (own_error > kMaxOwnError) ended.unresolved += own_error;
     if (!IsScoreWithinRegion()) ended.unresolved += 1;
   }
   return absl::OkStatus();

@@ -21,6 +21,11 @@ Matrix SpreadOf(const Matrix& covariance, const Vector& unit) {
   return Matrix(covariance.diagonal().cwiseMax(least.diagonal()).cwiseSqrt().asDiagonal());
 }
 
+Matrix NoWiderThan(const Vector& unit, const Matrix& covariance) {
+  const Vector most = unit.cwiseQuotient(covariance.diagonal().cwiseSqrt()).cwiseMin(1);
+  return most.asDiagonal() * covariance * most.asDiagonal();
+}
+
 EndedRuns WithoutEndedRuns(const ResolvedProblem& problem, Region region,
                            const GermSummary& posterior, const LearnedNoise& noise) {
   EndedRuns ended;

@@ -14,6 +14,9 @@ namespace polyest::internal {
 // Returns the lower triangular factor of a covariance, at least 10⁻⁹ of `unit`.
 Matrix SpreadOf(const Matrix& covariance, const Vector& unit);
 
+// Returns the covariance with standard deviations of at most `unit`, and with its correlations.
+Matrix NoWiderThan(const Vector& unit, const Matrix& covariance);
+
 // Returns what is known of no ended runs, in terms over `region` of the shared germs, whose
 // posterior is `posterior`. The sums will be taken with the scales of `noise`.
 EndedRuns WithoutEndedRuns(const ResolvedProblem& problem, Region region,
