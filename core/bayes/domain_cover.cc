@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "core/chaos/collocation_points.h"
-#include "core/chaos/normal.h"
+#include "core/common/golden_fraction.h"
 
 namespace polyest::internal {
 namespace {

@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "core/chaos/normal.h"
 #include "core/common/check.h"
+#include "core/common/golden_fraction.h"
 
 namespace polyest::internal {
 namespace {

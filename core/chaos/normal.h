@@ -1,6 +1,6 @@
 #pragma once
 
-// The standard normal distribution, and the step of additive sequences.
+// The standard normal distribution.
 
 #include <cmath>
 #include <numbers>
@@ -11,8 +11,5 @@ inline constexpr double kLogTwoPi = 1.8378770664093454836;  // log 2π
 
 // Returns the distribution function at z. The complementary error function keeps the lower tail.
 inline double NormalCdf(double z) { return 0.5 * std::erfc(-z / std::numbers::sqrt2); }
-
-// The fractional parts of its multiples fill the unit interval most evenly.
-inline constexpr double kGoldenFraction = std::numbers::phi - 1;
 
 }  // namespace polyest::internal

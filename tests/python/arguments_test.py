@@ -82,6 +82,9 @@ def test_a_check_lists_values_of_a_wrong_form_and_bad_data(client, problem, tmp_
     lost = client.check({"uncertain": [{"name": "k", "uniform": {"lower": None, "upper": 2}}]})
     assert [str(one) for one in lost.errors] == [
         "uncertain[0].uniform.lower: null must be a number"]
+    order = client.check({"expansion": {"order": "auto"}})
+    assert [str(one) for one in order.errors] == [
+        'expansion.order: "auto" must be a whole number or "AUTO"']
     both = client.check(problem.copy().fix(k=1.0), {"t": [0.0, 1.0], "x": [0.0, np.inf]})
     assert [one.field for one in both.errors] == ["uncertain[0]", "x"]
     assert "inf is not finite" in str(both.errors[1]) and both.summary == []

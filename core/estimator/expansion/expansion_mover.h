@@ -53,9 +53,9 @@ class ExpansionMover {
   // Returns to the expansion that was there before the first move.
   void GoBack();
 
-  // Whether the allowance forbids to propagate the record from its beginning. If so, the move that
-  // was wanted counts as postponed.
+  // Whether the allowance forbids to propagate the record from its beginning.
   bool Withheld() const { return !moves_.allowance.AllowsRecord(request_.rows); }
+  // The same; if so, the move that the caller wanted counts as postponed.
   bool PostponedIfWithheld();
   ReplayAllowance& allowance() { return moves_.allowance; }
   // Counts trajectories × rows that were propagated for expansions that nobody keeps.

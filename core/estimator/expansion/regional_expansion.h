@@ -199,8 +199,8 @@ class RegionalExpansion {
   void BeginSums();
   void TakeEndedRuns();
   void EndRunOfSums();
-  // Returns the sample of a channel in the row with its weight. Adds one to what there is.
   WeightedSample Weighted(int row, int channel) const;
+  // Adds a sample to all of the sums; each function below adds it to one of them.
   void AbsorbSample(const WeightedSample& sample);
   void AddDifference(const WeightedSample& sample, double error);
   void AddToBlocks(const WeightedSample& sample);

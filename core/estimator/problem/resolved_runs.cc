@@ -9,8 +9,8 @@
 
 #include "core/bayes/population_cost.h"
 #include "core/chaos/collocation_points.h"
-#include "core/chaos/normal.h"
 #include "core/common/check.h"
+#include "core/common/golden_fraction.h"
 #include "core/estimator/problem/populations.h"
 #include "core/estimator/problem/resolved_problem.h"
 

@@ -49,8 +49,8 @@ std::string Shown(const Value& value) {
   return "null";
 }
 
-// Returns the number that a value stands for, if any. Protobuf also takes "1.5", but not " 1.5"; it
-// takes "0x10" for 16, too, which is no number of JSON.
+// Returns the number that a value stands for, if any. As in protobuf, that may be a text, "1.5",
+// but without blanks. Protobuf also takes "0x10" for 16; here it is no number.
 std::optional<double> NumberIn(const Value& value) {
   double number = value.number_value();
   if (value.has_number_value()) return number;

@@ -86,7 +86,9 @@ def _value(value: Any, field: FieldDescriptor, path: str) -> Optional[tuple[str,
 
 def _number(value: Any) -> Optional[float]:
     """Returns the number that a value stands for; protobuf also takes "1.5", but not " 1.5"."""
-    if isinstance(value, bool) or (isinstance(value, str) and value != value.strip()):
+    if isinstance(value, bool):
+        return None
+    if isinstance(value, str) and (value != value.strip() or "_" in value):
         return None
     try:
         return float(value)
@@ -100,7 +102,9 @@ def _rule(value: Any, field: FieldDescriptor) -> str:
     number = _number(value)
     if kind in _WHOLE:
         if number is None or not math.isfinite(number) or number != math.floor(number):
-            return "a whole number"
+            may_be_found = field.full_name == "polyest.v1.ExpansionOptions.order"
+            named = may_be_found and isinstance(value, str)
+            return 'a whole number or "AUTO"' if named else "a whole number"
         limit = _WHOLE[kind]
         return "" if -2.0**limit <= number < 2.0**limit else f"a whole number below 2^{limit}"
     if kind in _REAL:
