@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "polyest/catalogue.h"
 #include "polyest/estimator.h"
 #include "tests/testing/records.h"
@@ -32,9 +34,16 @@ TEST(TwoGlidersRecordNoise, HasTheResidualsThatOthersFound) {
   Problem problem = testing::TwoGlidersProblem(2);
   for (MeasuredOutput& measured : problem.measured) measured.noise = kUnknown;
   const Estimate estimate = EstimateInBatches(problem, *record, 1000);
-  // Our denominator holds the N − n/2 degrees of freedom left to each channel, theirs holds N.
-  EXPECT_NEAR(estimate.channels[0].noise_std_dev, 0.62, 0.01);
-  EXPECT_NEAR(estimate.channels[1].noise_std_dev, 0.59, 0.01);
+  // Others state the root mean square of the residuals. The noise is larger by what the fit takes
+  // up: 6 parameters of 495 samples to a channel, and as much again for the spread of the draws.
+  const double others[] = {0.62, 0.59};
+  for (size_t i = 0; i < 2; ++i) {
+    const ChannelEstimate& channel = estimate.channels[i];
+    const double mean_square = channel.chi_squared / static_cast<double>(channel.samples);
+    EXPECT_NEAR(channel.noise_std_dev * std::sqrt(mean_square), others[i], 0.01);
+    EXPECT_GT(mean_square, 1 - 2 * 6 / 495.0);
+    EXPECT_LE(mean_square, 1);
+  }
   EXPECT_TRUE(Has(estimate, DiagnosticCode::kCorrelatedResiduals));
 }
 
