@@ -31,12 +31,14 @@ std::string CheckServer(const std::string& server) {
     return "\"" + server + "\" must be HOST:PORT, an IPv6 address in brackets, as in [::1]:50051";
   }
   int port = 0;
-  if (colon != std::string::npos && colon > 0) {
+  const bool is_host = server.find('/') == std::string::npos;
+  if (colon != std::string::npos && colon > 0 && is_host) {
     const char* const end = server.data() + server.size();
     const auto result = std::from_chars(server.data() + colon + 1, end, port);
     if (result.ec == std::errc() && result.ptr == end && port >= 1 && port <= 65535) return "";
   }
-  return "\"" + server + "\" must be HOST:PORT, the port from 1 to 65535";
+  return "\"" + server + "\" must be HOST:PORT, the port from 1 to 65535" +
+         (is_host ? "" : ", without \"http://\" or a path");
 }
 
 void AddAccess(CLI::App& command, ServerAccess& access) {

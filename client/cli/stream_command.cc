@@ -115,6 +115,14 @@ class StreamCommand {
 
   bool interrupted() const { return interrupt_.Requested(); }
 
+  // Returns an error if an interrupt has kept rows of a file from being sent. It is the usual end
+  // of data from a pipe.
+  absl::Status HasSentFile() const {
+    if (!interrupted() || !is_file_) return absl::OkStatus();
+    return absl::CancelledError(absl::StrCat("interrupted: the estimate is of the first ",
+                                             skipped_ + sent_, " rows of ", DataName()));
+  }
+
  private:
   using LastEstimate = absl::StatusOr<std::optional<v1::Estimate>>;
 
@@ -131,7 +139,8 @@ class StreamCommand {
     options.any_first_run = !arguments_.session.empty();
     // Editors omit the end of a file's last line, but a program that writes it to a pipe has been
     // stopped within the line, and within a number perhaps.
-    options.whole_lines = !IsRegularFile(descriptor);
+    is_file_ = IsRegularFile(descriptor);
+    options.whole_lines = !is_file_;
     POLYEST_ASSIGN_OR_RETURN(const DataColumns columns,
                              DataColumnsFor(problem_, arguments_.place, options));
     auto reader = DataReader::Open(in, DataName(), columns);
@@ -337,6 +346,7 @@ class StreamCommand {
   Client client_;
   v1::Problem problem_;
   StreamProgress progress_;
+  bool is_file_ = false;  // whether the data are a file, rather than a pipe
   // Rows left out at the beginning of the data, because the session has them, and rows sent.
   int64_t skipped_ = 0, sent_ = 0;
   ProgressLine* line_ = nullptr;        // valid during Run()
@@ -360,7 +370,8 @@ int RunCommand(const StreamArguments& arguments, std::ostream& out, std::ostream
     out << '\n';
     PrintEstimate(**last, out);
   }
-  return kExitOk;
+  const absl::Status sent = command.HasSentFile();
+  return sent.ok() ? kExitOk : Report(sent, arguments.place.server, err);
 }
 
 }  // namespace polyest::internal

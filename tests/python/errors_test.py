@@ -244,6 +244,12 @@ def test_an_address_is_that_of_a_host_with_a_port(server):
         assert raised.value.field == "server"
 
 
+@pytest.mark.parametrize("server", ["http://rig:50051", "rig/v1:50051"])
+def test_an_address_is_no_url(server):
+    with pytest.raises(polyest.InvalidInput, match='must be HOST:PORT.*without "http://"'):
+        polyest.connect(server)
+
+
 @pytest.mark.parametrize("server", [
     "::1", "::1:50051", "2001:db8::1:50051", "fe80::1%eth0:50051",
 ])

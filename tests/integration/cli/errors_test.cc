@@ -324,6 +324,10 @@ TEST_F(ErrorsTest, BadUsage) {
     EXPECT_THAT(OneLine(Run({"estimate", problem, data, "--server", server}), 2),
                 HasSubstr("HOST:PORT"));
   }
+  for (const char* const server : {"http://rig:50051", "https://127.0.0.1:8080"}) {
+    EXPECT_THAT(OneLine(Run({"estimate", problem, data, "--server", server}), 2),
+                HasSubstr("without \"http://\" or a path"));
+  }
   for (const char* const server : {"::1", "::1:50051", "2001:db8::1:50051", "fe80::1%eth0:50051"}) {
     EXPECT_THAT(OneLine(Run({"estimate", problem, data, "--server", server}), 2),
                 HasSubstr("an IPv6 address in brackets, as in [::1]:50051"));

@@ -16,6 +16,7 @@ namespace polyest::internal {
 namespace {
 
 using ::testing::AllOf;
+using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
@@ -243,6 +244,20 @@ TEST_F(StreamTest, EndsInOrderWhenInterrupted) {
   process.Signal(SIGINT);
   EXPECT_THAT(process.ReadAll(), HasSubstr("samples up to t = "));
   EXPECT_EQ(process.Wait(), 0) << process.Errors();
+}
+
+TEST_F(StreamTest, SaysWhatItHasSentOfAFileWhenInterrupted) {
+  const std::string data = File("d.csv", DemoRows(6000));
+  std::vector<std::string> arguments = Command(data, {"--rate", "1", "--batch", "2"});
+  arguments.insert(arguments.begin(), POLYEST_PROGRAM);
+  Process process(arguments);
+  EXPECT_THAT(process.ReadLine(), StartsWith("t = "));
+  process.Signal(SIGINT);
+  EXPECT_THAT(process.ReadAll(), HasSubstr("samples up to t = "));
+  EXPECT_EQ(process.Wait(), 1);
+  EXPECT_THAT(Lines(process.Errors()).back(),
+              AllOf(StartsWith("polyest: interrupted: the estimate is of the first "),
+                    EndsWith(" rows of " + data)));
 }
 
 TEST_F(StreamTest, KeepsTheRowsBeforeABadOneAndSaysWhichItIs) {

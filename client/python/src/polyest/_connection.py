@@ -41,6 +41,9 @@ class ConnectionOptions:
         if _is_ipv6(str(self.server)) or _is_ipv6(host):
             raise _invalid("server", f'"{self.server}" must be HOST:PORT, an IPv6 address in '
                            "brackets, as in [::1]:50051")
+        if "/" in str(self.server):
+            raise _invalid("server", f'"{self.server}" must be HOST:PORT, the port from 1 to 65535, '
+                           'without "http://" or a path')
         if not host or not _PORT.fullmatch(port) or not 1 <= int(port[-5:]) <= 65535:
             raise _invalid("server", f'"{self.server}" must be HOST:PORT, the port from 1 to 65535')
         if self.token is not None and not isinstance(self.token, str):
