@@ -60,10 +60,11 @@ void PrintParameters(const v1::Estimate& estimate, std::ostream& out) {
   TextTable table(
       {"parameter", "estimate ± sd", "unit", "95 % interval", "prior", "sd/prior", "verdict"});
   for (const v1::ParameterEstimate& p : estimate.parameters()) {
+    const double std_dev = ShownOf(p).std_dev;
     table.AddRow({p.name(), EstimateText(p), UnitText(p.unit()),
-                  FormatInterval(p.lower95(), p.upper95(), p.std_dev()),
+                  FormatInterval(p.lower95(), p.upper95(), std_dev),
                   FormatUncertain(p.prior_mean(), p.prior_std_dev()),
-                  FormatNumber(p.contraction(), 2),
+                  FormatNumber(std_dev / p.prior_std_dev(), 2),
                   PaintVerdict(out, p.verdict(), VerdictText(p.verdict()))});
   }
   table.Print(out);
@@ -201,11 +202,17 @@ void PrintSummary(const v1::Estimate& estimate, std::ostream& out) {
 
 }  // namespace
 
-std::string EstimateText(const v1::ParameterEstimate& p) {
+ShownEstimate ShownOf(const v1::ParameterEstimate& p) {
   // Where the data say less than the prior, the most probable value may be any that it allows.
-  const bool by_mean = p.verdict() == v1::Identifiability::NOT_IDENTIFIED;
-  return by_mean && p.posterior_std_dev() > 0 ? FormatUncertain(p.mean(), p.posterior_std_dev())
-                                              : FormatUncertain(p.map(), p.std_dev());
+  const bool unknown = p.verdict() == v1::Identifiability::NOT_IDENTIFIED;
+  const bool wider = p.posterior_std_dev() >= 2 * p.std_dev();
+  if (p.posterior_std_dev() > 0 && (unknown || wider)) return {p.mean(), p.posterior_std_dev()};
+  return {p.map(), p.std_dev()};
+}
+
+std::string EstimateText(const v1::ParameterEstimate& p) {
+  const ShownEstimate shown = ShownOf(p);
+  return FormatUncertain(shown.value, shown.std_dev);
 }
 
 std::string VerdictText(v1::Identifiability::Verdict verdict) {

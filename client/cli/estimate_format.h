@@ -15,9 +15,19 @@ namespace polyest::internal {
 // Prints a whole estimate: parameters, channels, directions, cost, expansion, diagnostics.
 void PrintEstimate(const v1::Estimate& estimate, std::ostream& out);
 
-// Returns a parameter's estimate with its standard deviation, "40.6612 ± 0.0052", in the
-// parameter's unit: the most probable value, or the posterior's mean with the posterior's own
-// standard deviation for a parameter that is not identified. Whatever shows an estimate shows this.
+// A value of a parameter with its standard deviation, in the parameter's unit.
+struct ShownEstimate {
+  double value = 0;
+  double std_dev = 0;
+};
+
+// Returns what stands for a parameter: the most probable value with the curvature's standard
+// deviation. It is the posterior's mean with the posterior's own standard deviation where the most
+// probable value would mislead: the parameter is not identified, or the posterior is twice as wide
+// as the curvature says, as where it is in several pieces. Whatever shows an estimate shows this.
+ShownEstimate ShownOf(const v1::ParameterEstimate& p);
+
+// Returns ShownOf as "40.6612 ± 0.0052".
 std::string EstimateText(const v1::ParameterEstimate& p);
 
 // Returns one line: "t = 10 s  k = 40.661 ± 0.026 N/m  c = 0.203 ± 0.011 N s/m".

@@ -29,22 +29,49 @@ using Design = v1::ComputeExperimentDesignResponse;
 constexpr double kHelps = 0.5;
 constexpr int kMaxTimes = 400;
 
+bool Has(const v1::Estimate& estimate, v1::Diagnostic::Code code) {
+  return std::ranges::any_of(estimate.diagnostics(), [&](const v1::Diagnostic& diagnostic) {
+    return diagnostic.code() == code;
+  });
+}
+
+// Whether the data allow several separate values of a parameter, so that each is known better than
+// which of them is true.
+bool IsInPieces(const v1::Estimate& estimate, const v1::ParameterEstimate& p) {
+  return Has(estimate, v1::Diagnostic::MULTIPLE_MINIMA) &&
+         p.verdict() == v1::Identifiability::WEAK && p.posterior_std_dev() >= 2 * p.std_dev();
+}
+
+std::string DescribePieces(const v1::ParameterEstimate& p, absl::string_view verdict,
+                           const std::string& unit) {
+  return absl::StrFormat(
+      "%s is %s: several separate values fit the data. About the most probable one it is %s%s, "
+      "over "
+      "all of them %s%s. A prior on one side of %s, or a measurement that tells them apart, would "
+      "decide between them.",
+      p.name(), verdict, FormatUncertain(p.map(), p.std_dev()), unit, EstimateText(p), unit,
+      p.name());
+}
+
 // Returns a sentence about the information that the data give about one parameter.
-std::string Describe(const v1::ParameterEstimate& p, std::ostream& out) {
+std::string Describe(const v1::Estimate& estimate, const v1::ParameterEstimate& p,
+                     std::ostream& out) {
   const std::string unit = p.unit().empty() || p.unit() == "1" ? "" : " " + p.unit();
   const std::string value = EstimateText(p) + unit;
   const std::string verdict = PaintVerdict(
       out, p.verdict(),
       p.verdict() == v1::Identifiability::WEAK ? "weakly identified" : VerdictText(p.verdict()));
+  if (IsInPieces(estimate, p)) return DescribePieces(p, verdict, unit);
+  const double narrower = p.prior_std_dev() / ShownOf(p).std_dev;
   switch (p.verdict()) {
     case v1::Identifiability::IDENTIFIED:
       return absl::StrFormat("%s is %s: %s, %.*f times narrower than your prior.", p.name(),
-                             verdict, value, p.contraction() > 0.1 ? 1 : 0, 1 / p.contraction());
+                             verdict, value, narrower < 10 ? 1 : 0, narrower);
     case v1::Identifiability::WEAK:
-      if (p.contraction() < kHelps) {
+      if (narrower * kHelps > 1) {
         return absl::StrFormat(
             "%s is %s: %s, %.*f times narrower than your prior, but a warning puts that in doubt.",
-            p.name(), verdict, value, p.contraction() > 0.1 ? 1 : 0, 1 / p.contraction());
+            p.name(), verdict, value, narrower < 10 ? 1 : 0, narrower);
       }
       return absl::StrFormat("%s is %s: %s; the data add little to your prior, %s%s.", p.name(),
                              verdict, value, FormatUncertain(p.prior_mean(), p.prior_std_dev()),
@@ -180,9 +207,10 @@ std::vector<int> OpenParameters(const ExplainInput& input) {
   for (int i = 0; i < input.estimate.parameters_size(); ++i) {
     // The parameters of further runs follow those of the first; the same remedies apply to them.
     if (i >= input.problem.uncertain_size()) break;
-    if (input.estimate.parameters(i).verdict() != v1::Identifiability::IDENTIFIED) {
-      open.push_back(i);
-    }
+    const v1::ParameterEstimate& p = input.estimate.parameters(i);
+    const bool identified = p.verdict() == v1::Identifiability::IDENTIFIED;
+    // Designs are linear: they see one piece, which is narrow already.
+    if (!identified && !IsInPieces(input.estimate, p)) open.push_back(i);
   }
   return open;
 }
@@ -190,17 +218,13 @@ std::vector<int> OpenParameters(const ExplainInput& input) {
 // Prints what the data say of the parameters. `design`: for those that are open, if there is one.
 void PrintExplanation(const v1::Estimate& estimate, const std::vector<int>& open,
                       const std::optional<Design>& design, std::ostream& out) {
-  for (const v1::ParameterEstimate& p : estimate.parameters()) PrintSentence(out, Describe(p, out));
+  for (const v1::ParameterEstimate& p : estimate.parameters()) {
+    PrintSentence(out, Describe(estimate, p, out));
+  }
   PrintTradeOffs(estimate, out);
   PrintDiagnostics(estimate.diagnostics(), out);
   if (!design) return;
   for (const int i : open) PrintSentence(out, Proposal(*design, i, estimate.parameters(i)));
-}
-
-bool HasFixedValueConflict(const v1::Estimate& estimate) {
-  return std::ranges::any_of(estimate.diagnostics(), [](const v1::Diagnostic& diagnostic) {
-    return diagnostic.code() == v1::Diagnostic::FIXED_VALUE_CONFLICT;
-  });
 }
 
 absl::Status Explain(const ExplainArguments& arguments, std::ostream& out) {
@@ -220,7 +244,7 @@ absl::Status Explain(const ExplainArguments& arguments, std::ostream& out) {
   if (arguments.no_remedies || !CallsForRemedies(input.problem, input.estimate)) {
     return absl::OkStatus();
   }
-  if (HasFixedValueConflict(input.estimate)) {
+  if (Has(input.estimate, v1::Diagnostic::FIXED_VALUE_CONFLICT)) {
     out << '\n';
     PrintSentence(
         out,

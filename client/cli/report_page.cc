@@ -71,7 +71,7 @@ std::string Parameters(const v1::Estimate& estimate) {
   std::vector<std::string> classes;
   for (const v1::ParameterEstimate& p : estimate.parameters()) {
     rows.push_back({p.name(), EstimateText(p), UnitText(p.unit()),
-                    FormatInterval(p.lower95(), p.upper95(), p.std_dev()),
+                    FormatInterval(p.lower95(), p.upper95(), ShownOf(p).std_dev),
                     FormatUncertain(p.prior_mean(), p.prior_std_dev()), VerdictText(p.verdict())});
     classes.push_back(v1::Identifiability::Verdict_Name(p.verdict()));
   }

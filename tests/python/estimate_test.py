@@ -106,13 +106,14 @@ def test_tables_show_one_value_of_a_parameter():
     def parameter(verdict, posterior_std_dev):
         message = estimate_pb2.ParameterEstimate(
             name="k", map=1.5, std_dev=0.5, mean=2.0, posterior_std_dev=posterior_std_dev,
-            verdict=verdict)
+            prior_std_dev=2.0, verdict=verdict)
         return of_message(estimate_pb2.Estimate(parameters=[message]))
 
     verdicts = estimate_pb2.Identifiability
     for verdict, deviation, shown, text in (
             (verdicts.IDENTIFIED, 0.25, (1.5, 0.5), "1.50 ± 0.50"),
             (verdicts.WEAK, 0.9, (1.5, 0.5), "1.50 ± 0.50"),
+            (verdicts.WEAK, 1.0, (2.0, 1.0), "2.0 ± 1.0"),
             (verdicts.NOT_IDENTIFIED, 0.25, (2.0, 0.25), "2.00 ± 0.25"),
             (verdicts.NOT_IDENTIFIED, 0.0, (1.5, 0.5), "1.50 ± 0.50")):
         found = parameter(verdict, deviation)

@@ -225,6 +225,7 @@ class Assessment {
         parameter.verdict = Verdict::kWeak;
       }
       DescribeMarginal(posterior_, prior_, i, parameter);
+      if (!findings_.other_minima.empty()) DoubtIfPiecesSpread(parameter);
       estimate_.parameters.push_back(std::move(parameter));
     }
     GoByPriorIfInaccurate(findings_, prior_, estimate_);

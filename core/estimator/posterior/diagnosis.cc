@@ -195,19 +195,24 @@ void AddComponents(const Findings& findings, const Estimate& estimate,
   diagnostics.push_back({DiagnosticCode::kMultipleMinima, std::move(message)});
 }
 
+// Returns the parameters' values as "k = 40.2, c = 0.2".
+std::string PlaceOf(const Findings& findings, const Vector& theta) {
+  std::vector<std::string> values;
+  for (int i = 0; i < theta.size(); ++i) {
+    values.push_back(absl::StrFormat("%s = %.6g", findings.NameOf(i), theta[i]));
+  }
+  return absl::StrJoin(values, ", ");
+}
+
 void AddMinima(const Findings& findings, std::vector<Diagnostic>& diagnostics) {
   if (!findings.other_minima.empty()) {
     std::vector<std::string> places;
-    for (const Vector& theta : findings.other_minima) {
-      std::vector<std::string> values;
-      for (int i = 0; i < theta.size(); ++i) {
-        values.push_back(absl::StrFormat("%s = %.6g", findings.NameOf(i), theta[i]));
-      }
-      places.push_back(absl::StrJoin(values, ", "));
-    }
-    diagnostics.push_back({DiagnosticCode::kMultipleMinima,
-                           absl::StrFormat("the cost has other minima of comparable depth at %s",
-                                           absl::StrJoin(places, " and at "))});
+    for (const Vector& theta : findings.other_minima) places.push_back(PlaceOf(findings, theta));
+    diagnostics.push_back(
+        {DiagnosticCode::kMultipleMinima,
+         absl::StrFormat("beside that at %s the cost has other minima of comparable depth at %s",
+                         PlaceOf(findings, findings.problem->prior().ToParameters(findings.map_xi)),
+                         absl::StrJoin(places, " and at "))});
   }
   if (!findings.converged) {
     diagnostics.push_back({DiagnosticCode::kNotConverged,

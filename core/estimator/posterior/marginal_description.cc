@@ -32,6 +32,13 @@ void DescribeMarginal(const PosteriorDraws& posterior, const Prior& prior, int i
   parameter.upper95 = quantile(0.975);
 }
 
+void DoubtIfPiecesSpread(ParameterEstimate& parameter) {
+  if (parameter.verdict != Verdict::kIdentified) return;
+  const double contraction = parameter.posterior_std_dev / parameter.prior_std_dev;
+  if (VerdictOfContraction(contraction) == Verdict::kIdentified) return;
+  parameter.verdict = Verdict::kWeak;
+}
+
 void ReplaceDeviation(int i, double std_dev, Estimate& estimate) {
   ParameterEstimate& parameter = estimate.parameters[static_cast<size_t>(i)];
   const double ratio = std_dev / parameter.std_dev;

@@ -17,6 +17,10 @@ namespace polyest::internal {
 void DescribeMarginal(const PosteriorDraws& posterior, const Prior& prior, int i,
                       ParameterEstimate& parameter);
 
+// Calls a parameter WEAK, not IDENTIFIED, if the posterior in all its pieces is too wide for that,
+// however narrow the piece at the minimum is.
+void DoubtIfPiecesSpread(ParameterEstimate& parameter);
+
 // Replaces the standard deviation of parameter i, with its row and column of the covariance.
 void ReplaceDeviation(int i, double std_dev, Estimate& estimate);
 

@@ -4,7 +4,6 @@
 #include <numeric>
 #include <utility>
 
-#include "core/bayes/identifiability.h"
 #include "core/common/infeasible.h"
 #include "core/common/status.h"
 #include "core/estimator/posterior/component_of_estimate.h"
@@ -81,11 +80,7 @@ void DescribeWhole(const Prior& prior, const PosteriorDraws& posterior, const Fi
   for (int i = 0; i < prior.dimension(); ++i) {
     ParameterEstimate& parameter = estimate.parameters[static_cast<size_t>(i)];
     DescribeMarginal(posterior, prior, i, parameter);
-    const double contraction = std::min(1.0, parameter.posterior_std_dev / parameter.prior_std_dev);
-    if (parameter.verdict == Verdict::kIdentified &&
-        VerdictOfContraction(contraction) != Verdict::kIdentified) {
-      parameter.verdict = Verdict::kWeak;
-    }
+    DoubtIfPiecesSpread(parameter);
   }
   if (!findings.UsesData()) GoByPriorIfInaccurate(findings, prior, estimate);
 }

@@ -159,6 +159,17 @@ TEST(EstimateText, IsThePosteriorsMeanWhereTheDataTellLessThanThePrior) {
   EXPECT_EQ(EstimateText(p), "0.29 ± 0.44");
 }
 
+TEST(EstimateText, IsThePosteriorsMeanWhereThePosteriorIsInSeveralPieces) {
+  v1::ParameterEstimate p;
+  p.set_map(0.80);
+  p.set_std_dev(0.01);
+  p.set_mean(0.1);
+  p.set_posterior_std_dev(0.75);
+  p.set_prior_std_dev(0.72);
+  p.set_verdict(v1::Identifiability::WEAK);
+  EXPECT_EQ(EstimateText(p), "0.10 ± 0.75");
+}
+
 TEST(PrintEstimate, DividesByNoSamples) {
   v1::Estimate estimate = ExampleEstimate();
   estimate.mutable_channels(0)->set_samples(0);

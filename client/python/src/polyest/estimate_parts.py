@@ -53,10 +53,13 @@ class Parameter:
     def shown(self) -> tuple[float, float]:
         """The value that tables show and its standard deviation, as `polyest estimate` has them.
 
-        That is `map` ± `std_dev`. Where the data say less than the prior ("NOT_IDENTIFIED"), the
-        most probable value may be any that the prior allows: then `mean` ± `posterior_std_dev`.
+        That is `map` ± `std_dev`, and `mean` ± `posterior_std_dev` where the most probable value
+        would mislead: where the data say less than the prior ("NOT_IDENTIFIED"), and where the
+        posterior is twice as wide as the curvature says, as with several pieces.
         """
-        if self.verdict == "NOT_IDENTIFIED" and self.posterior_std_dev > 0:
+        unknown = self.verdict == "NOT_IDENTIFIED"
+        wider = self.posterior_std_dev >= 2 * self.std_dev
+        if self.posterior_std_dev > 0 and (unknown or wider):
             return self.mean, self.posterior_std_dev
         return self.map, self.std_dev
 

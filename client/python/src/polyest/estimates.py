@@ -151,7 +151,7 @@ class Estimate:
         return [(one.name, _html.uncertain(*one.shown), one.unit,
                  _html.interval(one.lower95, one.upper95),
                  _html.uncertain(one.prior_mean, one.prior_std_dev),
-                 _html.number(one.contraction, 2), one.verdict) for one in self.parameters]
+                 _html.number(one.shown[1] / one.prior_std_dev, 2), one.verdict) for one in self.parameters]
 
     _HEADER = ("parameter", "estimate ± sd", "unit", "95 % interval", "prior", "sd/prior",
                "verdict")

@@ -56,6 +56,9 @@ describe('the number that stands for a parameter', () => {
   it('is the mean where the data say less than the prior', () => {
     expect(shownOf(parameter('k', { verdict: 'NOT_IDENTIFIED', mean: 9, posteriorStdDev: 4 }))).toEqual({ value: 9, deviation: 4, isMean: true });
   });
+  it('is the mean where the distribution is much wider than one of its pieces', () => {
+    expect(shownOf(parameter('k', { map: 36.3, stdDev: 2, mean: 41, posteriorStdDev: 4 }))).toEqual({ value: 41, deviation: 4, isMean: true });
+  });
   it('is the most probable value of an older daemon that says no more', () => {
     expect(shownOf(parameter('k', { verdict: 'NOT_IDENTIFIED', posteriorStdDev: 0 })).isMean).toBe(false);
   });

@@ -109,6 +109,9 @@ TEST(Diagnostics, NameTheOtherMinimum) {
   // The range covers both pieces of the posterior.
   EXPECT_NEAR(estimate.parameters[0].lower95, -0.8, 0.05);
   EXPECT_NEAR(estimate.parameters[0].upper95, 0.8, 0.05);
+  // Each piece is narrow, but both together are wider than the prior.
+  EXPECT_LT(estimate.parameters[0].contraction, 0.05);
+  EXPECT_EQ(estimate.parameters[0].verdict, Verdict::kWeak);
 }
 
 TEST(Diagnostics, SayThatAFixedExpansionIsInaccurateAndHoldTheTruth) {
