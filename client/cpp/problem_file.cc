@@ -24,14 +24,15 @@
 namespace polyest {
 
 using namespace internal;
+using google::protobuf::Descriptor;
 
 namespace {
 
 constexpr size_t kMaxFileBytes = size_t{16} << 20;
 
 absl::Status InFile(absl::string_view name, const JsonError& error) {
-  if (error.line == 0) return absl::InvalidArgumentError(absl::StrCat(name, ": ", error.what));
-  return absl::InvalidArgumentError(absl::StrCat(name, ":", error.line, ": ", error.what));
+  return absl::InvalidArgumentError(
+      absl::StrCat(name, ":", error.line, ":", error.column, ": ", error.Sentence()));
 }
 
 // Returns an error that names all unknown fields in one line.
@@ -59,22 +60,24 @@ absl::StatusOr<v1::Problem> ParseProblem(absl::string_view json, absl::string_vi
     return absl::InvalidArgumentError(
         absl::StrCat(name, ": is empty; it must hold one JSON object, the problem"));
   }
-  if (const auto error = CheckJsonStructure(json)) return InFile(name, *error);
+  const Descriptor& type = *v1::Problem::descriptor();
+  if (const auto error = CheckJsonStructure(json, type)) {
+    if (KindOfText(json) != FileKind::kCsv) return InFile(name, *error);
+    return absl::InvalidArgumentError(
+        absl::StrCat(name, ": is CSV data; a problem is one JSON object"));
+  }
   v1::Problem problem;
   google::protobuf::util::JsonParseOptions options;
   options.ignore_unknown_fields = false;
   const auto status =
       google::protobuf::util::JsonStringToMessage(WithoutAutomaticOrder(json), &problem, options);
-  const std::string wrong = FindWrongValue(json, *v1::Problem::descriptor());
+  const std::string wrong = FindWrongValue(json, type);
   if (status.ok() && wrong.empty()) return problem;
-  if (KindOfText(json) == FileKind::kCsv) {
-    return absl::InvalidArgumentError(
-        absl::StrCat(name, ": is CSV data; a problem is one JSON object"));
-  }
-  const auto unknown = FindUnknownFields(json, *v1::Problem::descriptor());
+  const auto unknown = FindUnknownFields(json, type);
   if (!unknown.empty()) return UnknownFieldsError(name, unknown);
   if (!wrong.empty()) return absl::InvalidArgumentError(absl::StrCat(name, ": ", wrong));
-  return InFile(name, DescribeJsonError(json, {status.message().data(), status.message().size()}));
+  return absl::InvalidArgumentError(absl::StrCat(
+      name, ": ", DescribeParserMessage({status.message().data(), status.message().size()})));
 }
 
 absl::StatusOr<v1::Problem> ReadProblemFile(const std::string& path) {

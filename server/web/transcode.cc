@@ -43,11 +43,6 @@ rpc::Status Invalid(const std::string& message) {
   return status;
 }
 
-rpc::Status InBody(const JsonError& error) {
-  if (error.line == 0) return Invalid(error.what);
-  return Invalid(absl::StrCat("line ", error.line, " of the body: ", error.what));
-}
-
 // Adds the fields that are wrong, as google.rpc.BadRequest, to a status.
 rpc::Status WithDetails(rpc::Status status, const rpc::BadRequest& details) {
   auto& any = *status.add_details();
@@ -56,13 +51,24 @@ rpc::Status WithDetails(rpc::Status status, const rpc::BadRequest& details) {
   return status;
 }
 
+rpc::Status WrongValue(const std::string& message, const std::string& field,
+                       const std::string& rule) {
+  rpc::BadRequest details;
+  details.add_field_violations()->set_field(field);
+  details.mutable_field_violations(0)->set_description(rule);
+  return WithDetails(Invalid(message), details);
+}
+
 // `wrong` is "field: value and rule".
 rpc::Status WrongValue(const std::string& wrong) {
   const std::pair<std::string, std::string> parts = absl::StrSplit(wrong, absl::MaxSplits(": ", 1));
-  rpc::BadRequest details;
-  details.add_field_violations()->set_field(parts.first);
-  details.mutable_field_violations(0)->set_description(parts.second);
-  return WithDetails(Invalid(wrong), details);
+  return WrongValue(wrong, parts.first, parts.second);
+}
+
+rpc::Status InBody(const JsonError& error) {
+  const std::string message = absl::StrCat("line ", error.line, ", column ", error.column,
+                                           " of the body: ", error.Sentence());
+  return error.field.empty() ? Invalid(message) : WrongValue(message, error.field, error.rule);
 }
 
 rpc::Status UnknownFields(const std::vector<UnknownField>& fields) {
@@ -84,7 +90,7 @@ rpc::Status UnknownFields(const std::vector<UnknownField>& fields) {
 rpc::Status FromJsonText(const std::string& json, const google::protobuf::Descriptor& type,
                          std::string& bytes) {
   if (absl::StripAsciiWhitespace(json).empty()) return {};
-  if (const auto error = CheckJsonStructure(json)) return InBody(*error);
+  if (const auto error = CheckJsonStructure(json, type)) return InBody(*error);
   google::protobuf::util::JsonParseOptions options;
   options.ignore_unknown_fields = false;
   const auto read = google::protobuf::util::JsonToBinaryString(
@@ -98,7 +104,7 @@ rpc::Status FromJsonText(const std::string& json, const google::protobuf::Descri
     if (!unknown.empty()) return UnknownFields(unknown);
   }
   if (!wrong.empty()) return WrongValue(wrong);
-  return InBody(DescribeJsonError(json, {read.message().data(), read.message().size()}));
+  return Invalid(DescribeParserMessage({read.message().data(), read.message().size()}));
 }
 
 absl::StatusOr<std::string> ToJsonText(const std::string& bytes,

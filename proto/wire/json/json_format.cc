@@ -144,8 +144,9 @@ absl::StatusOr<std::string> TryToJson(const google::protobuf::Message& message,
 }
 
 absl::Status FromJson(const std::string& json, google::protobuf::Message& message) {
-  if (const auto error = CheckJsonStructure(json)) {
-    return absl::InvalidArgumentError(absl::StrCat("line ", error->line, ": ", error->what));
+  if (const auto error = CheckJsonStructure(json, *message.GetDescriptor())) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("line ", error->line, ", column ", error->column, ": ", error->Sentence()));
   }
   const JsonType type(message);
   std::string bytes;

@@ -8,6 +8,7 @@
 #include <map>
 
 #include "core/common/nearest_name.h"
+#include "proto/wire/json/json_field.h"
 
 namespace polyest::internal {
 namespace {
@@ -16,14 +17,6 @@ using google::protobuf::Descriptor;
 using google::protobuf::FieldDescriptor;
 using google::protobuf::Struct;
 using google::protobuf::Value;
-
-const FieldDescriptor* FindField(const Descriptor& message, absl::string_view name) {
-  for (int i = 0; i < message.field_count(); ++i) {
-    const FieldDescriptor& field = *message.field(i);
-    if (field.json_name() == name || field.name() == name) return &field;
-  }
-  return nullptr;
-}
 
 std::vector<std::string> FieldNames(const Descriptor& message) {
   std::vector<std::string> names;

@@ -6,6 +6,7 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 #include <absl/strings/str_join.h>
+#include <google/protobuf/descriptor.pb.h>
 #include <google/protobuf/struct.pb.h>
 #include <google/protobuf/util/json_util.h>
 
@@ -15,6 +16,7 @@
 #include <vector>
 
 #include "core/common/nearest_name.h"
+#include "proto/wire/json/json_field.h"
 
 namespace polyest::internal {
 namespace {
@@ -25,6 +27,8 @@ using google::protobuf::FieldDescriptor;
 using google::protobuf::OneofDescriptor;
 using google::protobuf::Struct;
 using google::protobuf::Value;
+
+constexpr char kObjectRule[] = "an object, in braces { }";
 
 // Returns a value as it stands in the file, or what kind of value it is if it is long.
 std::string Shown(const Value& value) {
@@ -129,7 +133,8 @@ class Search {
     std::map<const OneofDescriptor*, std::string> given;
     for (const auto& [name, value] : fields) {
       const FieldDescriptor* const field = FindField(message, name);
-      if (field == nullptr || (value.has_null_value() && MayBeNull(*field))) continue;
+      // CheckJsonStructure refuses a null where it does not stand for a field that is not given.
+      if (field == nullptr || value.has_null_value()) continue;
       if (const OneofDescriptor* const choice = field->real_containing_oneof()) {
         const auto [first, is_first] = given.emplace(choice, name);
         if (!is_first) return RefuseBoth(*choice, first->second, name, prefix);
@@ -142,20 +147,6 @@ class Search {
   std::string Take() { return std::move(wrong_); }
 
  private:
-  // Whether null stands for a field that is not given, as in protobuf. In place of a number it is a
-  // number that has been lost: programs write NaN so.
-  static bool MayBeNull(const FieldDescriptor& field) {
-    return field.is_repeated() || field.message_type() != nullptr;
-  }
-
-  static const FieldDescriptor* FindField(const Descriptor& message, absl::string_view name) {
-    for (int i = 0; i < message.field_count(); ++i) {
-      const FieldDescriptor& field = *message.field(i);
-      if (field.json_name() == name || field.name() == name) return &field;
-    }
-    return nullptr;
-  }
-
   void Refuse(const std::string& path, const Value& value, absl::string_view rule) {
     wrong_ = absl::StrCat(path, ": ", Shown(value), " must be ", rule);
   }
@@ -178,7 +169,7 @@ class Search {
   }
 
   void WalkMap(const Value& value, const FieldDescriptor& field, const std::string& path) {
-    if (!value.has_struct_value()) return Refuse(path, value, "an object, in braces { }");
+    if (!value.has_struct_value()) return Refuse(path, value, kObjectRule);
     const std::map<std::string, Value> entries(value.struct_value().fields().begin(),
                                                value.struct_value().fields().end());
     for (const auto& [key, entry] : entries) {
@@ -196,7 +187,7 @@ class Search {
     } else if (value.has_struct_value()) {
       Walk(value.struct_value(), *message, path);
     } else if (!absl::StartsWith(message->full_name(), "google.protobuf.")) {
-      Refuse(path, value, "an object, in braces { }");
+      Refuse(path, value, kObjectRule);
     }
   }
 
@@ -204,6 +195,15 @@ class Search {
 };
 
 }  // namespace
+
+std::string RefusalOfNull(const FieldDescriptor& field) {
+  const bool is_message = field.message_type() != nullptr;
+  const bool is_in_map = field.containing_type()->options().map_entry();
+  if (!is_in_map && (field.is_repeated() || is_message)) return "";
+  Value null;
+  null.set_null_value(google::protobuf::NULL_VALUE);
+  return absl::StrCat("null must be ", is_message ? kObjectRule : RuleOf(field, null));
+}
 
 std::string FindWrongValue(absl::string_view json, const Descriptor& message) {
   Struct object;

@@ -77,6 +77,13 @@ TEST_F(ErrorsTest, NamesThatAreMissingOrUnknown) {
               HasSubstr("problem.json: expnsion: unknown field"));
 }
 
+TEST_F(ErrorsTest, AProblemThatIsNotQuiteJson) {
+  EXPECT_THAT(Refused("{\"fixed\": {\"m\": 1},\n \"uncertain\": [],\n}", kData),
+              HasSubstr("problem.json:2:17: no comma may follow the last value"));
+  EXPECT_THAT(Refused("{'fixed': {}}", kData),
+              HasSubstr("problem.json:1:2: names and texts stand in double quotes"));
+}
+
 TEST_F(ErrorsTest, APriorWithoutWidth) {
   EXPECT_THAT(Refused(Changed("\"lower\": 31.584", "\"lower\": 50"), kData),
               AllOf(HasSubstr("problem.json: uncertain[0].uniform: "), HasSubstr("50"),

@@ -98,9 +98,10 @@ TEST(ParseProblem, NamesAFieldOfTheWrongType) {
 
 // Protobuf would take each of them for another value.
 TEST(ParseProblem, RefusesALostNumberAndOtherTypes) {
-  EXPECT_EQ(ErrorOf(R"({"fixed": {"x0": null}})"), "problem.json: fixed.x0: null must be a number");
+  EXPECT_EQ(ErrorOf(R"({"fixed": {"x0": null}})"),
+            "problem.json:1:18: fixed.x0: null must be a number");
   EXPECT_EQ(ErrorOf(R"({"uncertain": [{"uniform": {"lower": null, "upper": 2}}]})"),
-            "problem.json: uncertain[0].uniform.lower: null must be a number");
+            "problem.json:1:38: uncertain[0].uniform.lower: null must be a number");
   EXPECT_EQ(ErrorOf(R"({"uncertain": [{"perRun": "yes"}]})"),
             "problem.json: uncertain[0].perRun: \"yes\" must be true or false");
   EXPECT_EQ(ErrorOf(R"({"measured": [{"noise": {"absolute": "0x10"}}]})"),
@@ -129,11 +130,23 @@ TEST(ParseProblem, RefusesASecondPrior) {
                          "of uniform, normal, "));
 }
 
-TEST(ParseProblem, FindsTheLineOfASyntaxError) {
+TEST(ParseProblem, FindsLineAndColumnOfASyntaxError) {
   EXPECT_EQ(ErrorOf("{\n  \"model\": {\"builtin\": \"duffing\"},\n  \"fixed\" {\"m\": 1}\n}\n"),
-            "problem.json:3: Expected : between key:value pair.");
-  EXPECT_THAT(ErrorOf("{\n\"fixed\": {\n"), StartsWith("problem.json:3: Unexpected end of string"));
-  EXPECT_THAT(ErrorOf("{\"fixed\": {\"m\": NaN}}"), StartsWith("problem.json:1: "));
+            "problem.json:3:11: a colon must follow the name \"fixed\", not {");
+  EXPECT_EQ(ErrorOf("{\n\"fixed\": {\n"),
+            "problem.json:3:1: the text ends before the { of line 2, column 10 is closed");
+  EXPECT_THAT(ErrorOf("{\"fixed\": {\"m\": NaN}}"),
+              StartsWith("problem.json:1:17: NaN is no value of JSON, "));
+}
+
+// Protobuf takes all of it, other programs that read problem files do not.
+TEST(ParseProblem, RefusesWhatIsNotQuiteJson) {
+  EXPECT_EQ(ErrorOf("{\"fixed\": {\"m\": 1},\n}"),
+            "problem.json:1:19: no comma may follow the last value");
+  EXPECT_EQ(ErrorOf("{'fixed': {\"m\": 1}}"),
+            "problem.json:1:2: names and texts stand in double quotes, not in single ones");
+  EXPECT_EQ(ErrorOf("{\n  fixed: {\"m\": 1}}"),
+            "problem.json:2:3: the name fixed must stand in double quotes");
 }
 
 TEST(ParseProblem, RefusesWhatIsNoObject) {
@@ -143,22 +156,22 @@ TEST(ParseProblem, RefusesWhatIsNoObject) {
 
 TEST(ParseProblem, RefusesDeepNestingWithoutFallingOver) {
   const std::string deep(100'000, '[');
-  EXPECT_EQ(ErrorOf(deep), "problem.json:1: brackets are nested more than 100 deep");
+  EXPECT_EQ(ErrorOf(deep), "problem.json:1:101: brackets are nested more than 100 deep");
   EXPECT_EQ(ErrorOf("{\"fixed\":\n{\"kt\":" + deep),
-            "problem.json:2: brackets are nested more than 100 deep");
+            "problem.json:2:105: brackets are nested more than 100 deep");
 }
 
 TEST(ParseProblem, RefusesAFieldThatIsGivenTwice) {
   EXPECT_EQ(ErrorOf("{\"fixed\": {\"m\": 1},\n \"fixed\": {\"c\": 2}}"),
-            "problem.json:2: fixed: given twice");
+            "problem.json:2:2: fixed: given twice");
   EXPECT_EQ(ErrorOf(R"({"uncertain": [{"name": "k", "uniform": {"lower": 500, "lower": 600}}]})"),
-            "problem.json:1: uncertain[0].uniform.lower: given twice");
+            "problem.json:1:56: uncertain[0].uniform.lower: given twice");
 }
 
 TEST(ParseProblem, LeavesOutTheMarkOfUtf8) {
   EXPECT_TRUE(ParseProblem("\xEF\xBB\xBF{\"fixed\": {\"m\": 1}}", "problem.json").ok());
   EXPECT_EQ(ErrorOf("\xEF\xBB\xBF\n{\"fixed\" 1}"),
-            "problem.json:2: Expected : between key:value pair.");
+            "problem.json:2:10: a colon must follow the name \"fixed\", not 1");
   EXPECT_THAT(ErrorOf("\xEF\xBB\xBF"), HasSubstr("is empty"));
 }
 

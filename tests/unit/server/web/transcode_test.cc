@@ -48,22 +48,39 @@ TEST(Transcode, TakesAProblemFileAsItIs) {
   EXPECT_FALSE(request.session().problem().expansion().has_order());
 }
 
-TEST(Transcode, NamesTheLineOfASyntaxError) {
+TEST(Transcode, NamesThePlaceOfASyntaxError) {
   const rpc::Status status = Read<v1::GetSessionRequest>("{\"name\":\n\"sessions/a}");
   EXPECT_EQ(status.code(), grpc::StatusCode::INVALID_ARGUMENT);
-  EXPECT_THAT(status.message(), HasSubstr("line 2"));
+  EXPECT_EQ(status.message(),
+            "line 2, column 1 of the body: the text that begins here has no closing quote on its "
+            "line");
+}
+
+TEST(Transcode, RefusesWhatIsNotQuiteJson) {
+  EXPECT_EQ(Read<v1::GetSessionRequest>("{\"name\": \"a\",}").message(),
+            "line 1, column 13 of the body: no comma may follow the last value");
+  EXPECT_EQ(Read<v1::GetSessionRequest>("{name: \"a\"}").message(),
+            "line 1, column 2 of the body: the name name must stand in double quotes");
 }
 
 TEST(Transcode, RefusesALostNumberWithItsField) {
-  const rpc::Status status = Read<v1::CreateSessionRequest>(
-      R"({"session": {"problem": {"uncertain": [{"uniform": {"lower": null, "upper": 2}}]}}})");
-  EXPECT_EQ(status.code(), grpc::StatusCode::INVALID_ARGUMENT);
-  EXPECT_EQ(status.message(), "session.problem.uncertain[0].uniform.lower: null must be a number");
-  ASSERT_EQ(status.details_size(), 1);
-  rpc::BadRequest details;
-  ASSERT_TRUE(details.ParseFromString(status.details(0).value()));
-  EXPECT_EQ(details.field_violations(0).field(), "session.problem.uncertain[0].uniform.lower");
-  EXPECT_EQ(details.field_violations(0).description(), "null must be a number");
+  // Of any length: wrong values of other types are looked for in short texts only.
+  const std::string long_text(size_t{2} << 20, 'x');
+  for (const std::string& schema : {std::string("s"), long_text}) {
+    const rpc::Status status = Read<v1::CreateSessionRequest>(
+        R"({"session": {"problem": {"$schema": ")" + schema +
+        "\",\n"
+        R"("uncertain": [{"uniform": {"lower": null, "upper": 2}}]}}})");
+    EXPECT_EQ(status.code(), grpc::StatusCode::INVALID_ARGUMENT);
+    EXPECT_EQ(status.message(),
+              "line 2, column 37 of the body: session.problem.uncertain[0].uniform.lower: null "
+              "must be a number");
+    ASSERT_EQ(status.details_size(), 1);
+    rpc::BadRequest details;
+    ASSERT_TRUE(details.ParseFromString(status.details(0).value()));
+    EXPECT_EQ(details.field_violations(0).field(), "session.problem.uncertain[0].uniform.lower");
+    EXPECT_EQ(details.field_violations(0).description(), "null must be a number");
+  }
 }
 
 TEST(Transcode, NamesEveryUnknownFieldWithWhatMayBeMeant) {
@@ -93,13 +110,14 @@ TEST(Transcode, RefusesDeepNestingAtOnce) {
   const rpc::Status status =
       Read<v1::CreateSessionRequest>(R"({"session": {"problem": {"fixed": {"kt": )" + deep);
   EXPECT_EQ(status.code(), grpc::StatusCode::INVALID_ARGUMENT);
-  EXPECT_EQ(status.message(), "line 1 of the body: brackets are nested more than 100 deep");
+  EXPECT_EQ(status.message(),
+            "line 1, column 138 of the body: brackets are nested more than 100 deep");
 }
 
 TEST(Transcode, RefusesAFieldThatIsGivenTwice) {
   const rpc::Status status = Read<v1::GetSessionRequest>("{\"name\": \"a\",\n\"name\": \"b\"}");
   EXPECT_EQ(status.code(), grpc::StatusCode::INVALID_ARGUMENT);
-  EXPECT_EQ(status.message(), "line 2 of the body: name: given twice");
+  EXPECT_EQ(status.message(), "line 2, column 1 of the body: name: given twice");
 }
 
 TEST(Transcode, WritesWhatTheCommandWrites) {
