@@ -4,7 +4,7 @@
 //   problem_schema_generator DESCRIPTOR_SET SCHEMA.json SCHEMA.cc
 //
 // The schema takes what is canonical: the lowerCamel names of fields and the names of enumerators.
-// A field or a oneof whose comment has the word "Required" is required.
+// A field or a oneof whose comment has the word "Required" is required, but not with "Required if".
 
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/descriptor.pb.h>
@@ -83,7 +83,9 @@ void Describe(const Element& element, Struct& schema) {
 
 template <typename Element>
 bool IsRequired(const Element& element) {
-  return CommentOf(element).find("Required") != std::string::npos;
+  const std::string comment = CommentOf(element);
+  const size_t at = comment.find("Required");
+  return at != std::string::npos && comment.compare(at, 11, "Required if") != 0;
 }
 
 std::string NameOf(const std::string& full_name) {

@@ -17,6 +17,7 @@
 #include "core/common/status.h"
 #include "proto/wire/json/json_error.h"
 #include "proto/wire/json/json_structure.h"
+#include "proto/wire/json/missing_bounds.h"
 #include "proto/wire/json/unknown_fields.h"
 #include "proto/wire/json/wrong_values.h"
 #include "proto/wire/transport/automatic_order.h"
@@ -71,7 +72,8 @@ absl::StatusOr<v1::Problem> ParseProblem(absl::string_view json, absl::string_vi
   options.ignore_unknown_fields = false;
   const auto status =
       google::protobuf::util::JsonStringToMessage(WithoutAutomaticOrder(json), &problem, options);
-  const std::string wrong = FindWrongValue(json, type);
+  std::string wrong = FindWrongValue(json, type);
+  if (status.ok() && wrong.empty()) wrong = FindMissingBound(json, problem);
   if (status.ok() && wrong.empty()) return problem;
   const auto unknown = FindUnknownFields(json, type);
   if (!unknown.empty()) return UnknownFieldsError(name, unknown);

@@ -130,6 +130,25 @@ TEST(ParseProblem, RefusesASecondPrior) {
                          "of uniform, normal, "));
 }
 
+// Protobuf would take it for 0.
+TEST(ParseProblem, RefusesAPriorWithoutOneOfItsBounds) {
+  EXPECT_EQ(ErrorOf(R"({"uncertain": [{"name": "k", "uniform": {"upper": 47.4}}]})"),
+            "problem.json: uncertain[0].uniform.lower: is missing; the uniform prior of k needs "
+            "lower and upper");
+  EXPECT_EQ(ErrorOf(R"({"uncertain": [{"name": "c", "normal": {"stdDev": 1}},
+                                      {"name": "k", "uniform": {"lower": -1}}]})"),
+            "problem.json: uncertain[1].uniform.upper: is missing; the uniform prior of k needs "
+            "lower and upper");
+  EXPECT_EQ(ErrorOf(R"({"uncertain": [{"name": "c", "uniform": {"lower": 0, "upper": 1}},
+                                      {"name": "k", "beta": {"alpha": 2, "beta": 2, "upper": 1}}]})"),
+            "problem.json: uncertain[1].beta.lower: is missing; the beta prior of k needs lower "
+            "and upper");
+  EXPECT_TRUE(ParseProblem(R"({"uncertain": [{"uniform": {"lower": 0, "upper": 1.0}},
+      {"uniform": {"lower": -1, "upper": "0"}}, {"beta": {"lower": 0, "upper": 1}}]})",
+                           "p")
+                  .ok());
+}
+
 TEST(ParseProblem, FindsLineAndColumnOfASyntaxError) {
   EXPECT_EQ(ErrorOf("{\n  \"model\": {\"builtin\": \"duffing\"},\n  \"fixed\" {\"m\": 1}\n}\n"),
             "problem.json:3:11: a colon must follow the name \"fixed\", not {");

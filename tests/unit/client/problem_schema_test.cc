@@ -187,6 +187,14 @@ TEST(ProblemSchema, TakesNumbersThatJsonCannotSay) {
   EXPECT_NE(WrongWith(R"({"model": {"builtin": "bicycle"}, "fixed": {"mu": "much"}})"), "");
 }
 
+TEST(ProblemSchema, WantsNoBoundsOfAKnownRate) {
+  EXPECT_EQ(WrongWith(R"({"model": {"builtin": "duffing"}, "uncertain": [
+      {"name": "k", "normal": {"mean": 1, "stdDev": 1},
+       "drift": {"randomWalk": {"stdDevPerSqrtS": 0.1}}}],
+      "processNoise": [{"state": "v", "spectralDensity": 0.01}]})"),
+            "");
+}
+
 TEST(ProblemSchema, SeesMistakes) {
   const auto with = [](const std::string& members) {
     const bool has_uncertain = members.find("uncertain") != std::string::npos;
@@ -214,6 +222,8 @@ TEST(ProblemSchema, SeesMistakes) {
   EXPECT_EQ(with(R"("uncertain": [{"name": "k", "uniform": {"lower": 0, "upper": 1},
                                      "normal": {"mean": 0, "stdDev": 1}}])"),
             "problem.uncertain[]: 2 of oneOf");
+  EXPECT_EQ(with(R"("uncertain": [{"name": "k", "uniform": {"upper": 1}}])"),
+            "problem.uncertain[].uniform: lower is missing");
 }
 
 TEST(ProblemSchema, ExplainsEveryField) {
