@@ -21,8 +21,7 @@ constexpr int kMaxJsonDepth = 100;
 // Returns the first place at which a text is no JSON (RFC 8259), has a number beyond the range of a
 // double or deeper brackets, has a field that its object has already, or a null in a list or in
 // place of a value of `type`, the message that the text should hold. None if there is no such
-// place. The names of fields are compared as they are written. Takes time in proportion to the
-// text.
+// place. Takes time in proportion to the text.
 std::optional<JsonError> CheckJsonStructure(absl::string_view json,
                                             const google::protobuf::Descriptor& type);
 
