@@ -1,52 +1,69 @@
-"""Reads JSON, and refuses an object that has a name twice: Python would keep the last value."""
+"""Reads JSON as the standard (RFC 8259) has it, and says where and why a text is none."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
-from typing import Any, Optional
+import math
+import re
+from typing import Any, NoReturn, Union
+
+from polyest._json_scan import MAX_DEPTH, JsonError, first_error
+
+__all__ = ["MAX_DEPTH", "JsonError", "loads"]
+
+# An escape that is a half of a character: Python reads one without the other, too.
+_HALF = re.compile(r"\\u[dD][89a-fA-F]")
 
 
-class GivenTwice(ValueError):
-    """An object has a name twice."""
-
-    def __init__(self, field: str) -> None:
-        super().__init__(f"{field}: given twice")
-        #: The path of the name, as in "uncertain[0].uniform.lower".
-        self.field = field
-
-
-def loads(text: str) -> Any:
-    """Returns what a text holds. Raises ValueError if it is not JSON, GivenTwice for a name."""
-    repeated: list[tuple[dict[str, Any], str]] = []
-
-    def made(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-        found = dict(pairs)
-        if len(found) < len(pairs):
-            names = [name for name, _ in pairs]
-            repeated.append((found, next(name for name in names if names.count(name) > 1)))
-        return found
-
-    document = json.loads(text, object_pairs_hook=made)
-    if repeated:
-        # Objects end from the inside out, so that the last of these is in no value that was lost.
-        place, name = repeated[-1]
-        raise GivenTwice(f"{_path(document, place) or ''}.{name}".lstrip("."))
+def loads(text: Union[str, bytes]) -> Any:
+    """Returns what a text holds. Raises JsonError if it is not JSON or has a name twice."""
+    if isinstance(text, bytes):
+        text = _decoded(text)
+    try:
+        document = json.loads(text, object_pairs_hook=_once, parse_constant=_refuse)
+        good = not _needs_scan(document) and _HALF.search(text) is None
+    except (ValueError, RecursionError):
+        good = False
+    if good:
+        return document
+    error = first_error(text)
+    if error is not None:
+        raise error
     return document
 
 
-def _path(document: Any, wanted: dict[str, Any], path: str = "") -> Optional[str]:
-    """Returns the path of an object in a document; None if it is not there."""
-    if document is wanted:
-        return path
-    found = (_path(part, wanted, at) for at, part in _parts(document, path))
-    return next((one for one in found if one is not None), None)
+def _needs_scan(document: Any) -> bool:
+    """Whether a document has what Python's reader takes: deep nests, lost and too large numbers."""
+    level = [document]
+    for _ in range(MAX_DEPTH + 1):
+        level = [part for part in level if isinstance(part, (dict, list))]
+        if not level:
+            return False
+        if any(None in part for part in level if isinstance(part, list)):
+            return True
+        level = [part for one in level for part in (one.values() if isinstance(one, dict) else one)]
+        if math.inf in level or -math.inf in level:
+            return True
+    return True
 
 
-def _parts(document: Any, path: str) -> Iterator[tuple[str, Any]]:
-    if isinstance(document, dict):
-        for name, part in document.items():
-            yield f"{path}.{name}".lstrip("."), part
-    elif isinstance(document, list):
-        for number, part in enumerate(document):
-            yield f"{path}[{number}]", part
+def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        raise ValueError
+    return found
+
+
+def _refuse(_: str) -> NoReturn:
+    raise ValueError
+
+
+def _decoded(data: bytes) -> str:
+    """Returns a text without the mark of UTF-8 that some editors write."""
+    data = data[3:] if data.startswith(b"\xef\xbb\xbf") else data
+    try:
+        return data.decode()
+    except UnicodeDecodeError as error:
+        before = data[:error.start].decode()
+        raise JsonError(before, len(before), f"the byte 0x{data[error.start]:02X} is no UTF-8, in "
+                        "which JSON is written") from None

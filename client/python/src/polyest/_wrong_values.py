@@ -5,6 +5,7 @@ The rules and their words are those of the command `polyest`.
 
 from __future__ import annotations
 
+import functools
 import json
 import math
 from collections.abc import Mapping
@@ -13,6 +14,7 @@ from typing import Any, Optional
 from google.protobuf.descriptor import Descriptor, EnumDescriptor, FieldDescriptor
 
 _WHOLE = {FieldDescriptor.CPPTYPE_INT32: 31, FieldDescriptor.CPPTYPE_INT64: 63}
+_TEXT = "a text without halves of characters"
 _REAL = (FieldDescriptor.CPPTYPE_DOUBLE, FieldDescriptor.CPPTYPE_FLOAT)
 
 
@@ -24,7 +26,7 @@ def find(document: Mapping[str, Any], message: Descriptor,
     """
     given: dict[str, str] = {}
     for name, value in sorted(document.items()):
-        field = message.fields_by_camelcase_name.get(name) or message.fields_by_name.get(name)
+        field = field_named(message, name)
         if field is None or (value is None and _may_be_null(field)):
             continue
         choice = field.containing_oneof
@@ -37,6 +39,28 @@ def find(document: Mapping[str, Any], message: Descriptor,
         if found is not None:
             return found
     return None
+
+
+@functools.lru_cache(maxsize=None)
+def _names(message: Descriptor) -> dict[str, FieldDescriptor]:
+    """Returns the fields by their names in JSON and in the contract."""
+    return {**message.fields_by_name, **{_name(field): field for field in message.fields}}
+
+
+def field_named(message: Descriptor, name: str) -> Optional[FieldDescriptor]:
+    """Returns the field of a message that JSON calls `name`, or that the contract does."""
+    return _names(message).get(name)
+
+
+def names_of(message: Descriptor) -> list[str]:
+    """Returns the names of a message's fields in JSON."""
+    return [_name(field) for field in message.fields]
+
+
+def is_map(field: FieldDescriptor) -> bool:
+    """Whether a field is a map: an object whose names the user chooses."""
+    entry = field.message_type
+    return entry is not None and bool(entry.GetOptions().map_entry)
 
 
 def is_repeated(field: FieldDescriptor) -> bool:
@@ -52,17 +76,19 @@ def _may_be_null(field: FieldDescriptor) -> bool:
 
 
 def _name(field: FieldDescriptor) -> str:
-    name: str = field.camelcase_name
+    name: str = field.json_name
     return name
 
 
 def _field(value: Any, field: FieldDescriptor, path: str) -> Optional[tuple[str, str]]:
-    entry = field.message_type
-    if entry is not None and entry.GetOptions().map_entry:
+    if is_map(field):
         if not isinstance(value, Mapping):
             return path, f"{_shown(value)} must be an object, in braces {{ }}"
+        wrong = next((name for name in sorted(value) if not _is_text(name)), None)
+        if wrong is not None:
+            return path, f"{_shown(wrong)} must be {_TEXT}"
         parts = [(f"{path}.{name}", part) for name, part in sorted(value.items())]
-        field = entry.fields_by_name["value"]
+        field = field.message_type.fields_by_name["value"]
     elif is_repeated(field):
         if not isinstance(value, (list, tuple)):
             return path, f"{_shown(value)} must be a list, in brackets [ ]"
@@ -92,6 +118,8 @@ def _number(value: Any) -> Optional[float]:
         return None
     try:
         return float(value)
+    except OverflowError:
+        return math.inf
     except (TypeError, ValueError):
         return None
 
@@ -108,14 +136,19 @@ def _rule(value: Any, field: FieldDescriptor) -> str:
         limit = _WHOLE[kind]
         return "" if -2.0**limit <= number < 2.0**limit else f"a whole number below 2^{limit}"
     if kind in _REAL:
-        if isinstance(value, float) and not math.isfinite(value):
+        if number is not None and not isinstance(value, str) and not math.isfinite(number):
             return "a finite number"
         return "" if number is not None else "a number"
     if kind == FieldDescriptor.CPPTYPE_BOOL:
         return "" if isinstance(value, bool) or value in ("true", "false") else "true or false"
     if kind == FieldDescriptor.CPPTYPE_ENUM:
         return _rule_of_enum(value, field.enum_type)
-    return "" if isinstance(value, str) else "a text in quotes"
+    return "" if _is_text(value) else _TEXT if isinstance(value, str) else "a text in quotes"
+
+
+def _is_text(value: Any) -> bool:
+    """Whether a value is a text of whole characters, as messages have it."""
+    return isinstance(value, str) and not any("\ud800" <= sign <= "\udfff" for sign in value)
 
 
 def _rule_of_enum(value: Any, kind: EnumDescriptor) -> str:
@@ -132,7 +165,7 @@ def _shown(value: Any) -> str:
     if isinstance(value, (list, tuple)):
         return "a list"
     try:
-        text = json.dumps(value, ensure_ascii=False)
+        text = json.dumps(value, ensure_ascii=isinstance(value, str) and not _is_text(value))
     except (TypeError, ValueError):
         text = repr(value)
-    return text if len(text) <= 62 else "a long text"
+    return text if len(text) <= 62 else f"a long {'number' if isinstance(value, int) else 'text'}"

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import copy
 import json
 import os
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Literal, Optional, Union
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Literal, Optional, TypeVar, Union
 
-import numpy as np
 from google.protobuf import json_format
 
-from polyest import _parsing, _strict_json
+from polyest import _documents, _parsing
 from polyest._files import file_error, path_of
 from polyest._proto.v1 import problem_pb2
 from polyest._request import json_of, mapping, number, numbers, pair, wrong
-from polyest.errors import InvalidInput, WrongType
+from polyest.errors import InvalidInput
 from polyest.noise import Noise
 from polyest.priors import Prior
 from polyest.signals import Interpolation, Signal, Streamed
@@ -24,6 +22,9 @@ if TYPE_CHECKING:
     from polyest._table import Data
     from polyest.check import Check
     from polyest.client import Client
+
+
+Part = TypeVar("Part", dict[str, Any], list[Any])
 
 
 class Problem:
@@ -42,7 +43,8 @@ class Problem:
 
     def __init__(self, document: Optional[Mapping[str, Any]] = None) -> None:
         """`document` is a problem file's JSON object; by default an empty problem."""
-        self._document: dict[str, Any] = copy.deepcopy(dict(document or {}))
+        given = {} if document is None else mapping("document", document, "a problem file's object")
+        self._document: dict[str, Any] = _documents.copied(given)
 
     @classmethod
     def builtin(cls, name: str) -> Problem:
@@ -79,7 +81,8 @@ class Problem:
             if value:
                 equations[name] = mapping(name, value)
         if inputs:
-            equations["inputs"] = [inputs] if isinstance(inputs, str) else list(inputs)
+            equations["inputs"] = ([inputs] if isinstance(inputs, str) or not isinstance(inputs, Iterable)
+                                   else list(inputs))
         if tables:
             equations["tables"] = {name: _points(f"tables.{name}", points)
                                    for name, points in mapping("tables", tables).items()}
@@ -88,12 +91,12 @@ class Problem:
     @classmethod
     def read(cls, path: Union[str, os.PathLike[str]]) -> Problem:
         """Reads a problem file. Raises InvalidInput if it is no problem."""
-        return cls(_read(path))
+        return cls(_documents.read(path))
 
     def fix(self, values: Optional[Mapping[str, float]] = None, **named: float) -> Problem:
         """Gives parameters, initial states, … known values, in the model's units."""
         known = {} if values is None else mapping("values", values, "numbers by name")
-        self._document.setdefault("fixed", {}).update({**known, **named})
+        self._object("fixed").update({**known, **named})
         return self
 
     def uncertain(self, name: str, prior: Prior, *, per_run: bool = False,
@@ -116,7 +119,7 @@ class Problem:
             entry["drift"] = {"randomWalk": {"unknown": True, "lower": lower, "upper": upper}}
         elif drift is not None:
             entry["drift"] = {"randomWalk": {"stdDevPerSqrtS": drift}}
-        self._document.setdefault("uncertain", []).append(entry)
+        self._list("uncertain").append(entry)
         return self
 
     def process_noise(self, state: str,
@@ -132,23 +135,23 @@ class Problem:
             entry.update(unknown=True, lower=lower, upper=upper)
         else:
             entry["spectralDensity"] = spectral_density
-        self._document.setdefault("processNoise", []).append(entry)
+        self._list("processNoise").append(entry)
         return self
 
     def correlate(self, first: str, second: str, coefficient: float) -> Problem:
         """Correlates the priors of two uncertain parameters (Gaussian copula), in (−1, 1)."""
-        self._document.setdefault("correlations", []).append(
+        self._list("correlations").append(
             {"first": first, "second": second, "coefficient": coefficient})
         return self
 
     def derive(self, name: str, expression: str) -> Problem:
         """Ties a parameter to others by an expression, such as "2*k1"."""
-        self._document.setdefault("derived", {})[name] = expression
+        self._object("derived")[_text("name", name)] = expression
         return self
 
     def drive(self, name: str, signal: Signal) -> Problem:
         """Says how an input of the model runs over time."""
-        self._document.setdefault("inputs", []).append(
+        self._list("inputs").append(
             {"name": name, **json_of("signal", signal, "a signal, such as polyest.Step(1.0)")})
         return self
 
@@ -168,14 +171,14 @@ class Problem:
         `column` and `unit` name the column of the data that has it, and that column's unit.
         """
         sizes = noise if isinstance(noise, Noise) else Noise(absolute=number("noise", noise))
-        self._document.setdefault("measured", []).append(
+        self._list("measured").append(
             {"output": output, "noise": sizes.as_json()})
         return self.column(output, column, unit) if column or unit else self
 
     def column(self, quantity: str, header: str = "", unit: str = "") -> Problem:
         """Says which column of the data has a quantity (or `t`, or `run`), and in which unit."""
         entry = {key: value for key, value in (("from", header), ("unit", unit)) if value}
-        self._document.setdefault("columns", {})[quantity] = entry
+        self._object("columns")[_text("quantity", quantity)] = entry
         return self
 
     def use_when(self, condition: str) -> Problem:
@@ -213,7 +216,22 @@ class Problem:
 
     def _merge(self, member: str, **values: Any) -> None:
         given = {name: value for name, value in values.items() if value is not None}
-        self._document.setdefault(member, {}).update(given)
+        self._object(member).update(given)
+
+    def _object(self, name: str) -> dict[str, Any]:
+        return self._member(name, {}, "an object, in braces { }")
+
+    def _list(self, name: str) -> list[Any]:
+        return self._member(name, [], "a list, in brackets [ ]")
+
+    def _member(self, name: str, empty: Part, what: str) -> Part:
+        """Returns a part of the document to add to. Raises WrongType if the document has another."""
+        found = self._document.setdefault(name, empty)
+        if found is None:
+            found = self._document[name] = empty  # null stands for what is not given
+        if not isinstance(found, type(empty)):
+            raise wrong(name, found, what)
+        return found
 
     def check(self, data: Optional[Data] = None, *, units: Optional[Mapping[str, str]] = None,
               client: Optional[Client] = None) -> Check:
@@ -227,11 +245,12 @@ class Problem:
 
     def as_dict(self) -> dict[str, Any]:
         """Returns the JSON object of the problem file."""
-        return copy.deepcopy(self._document)
+        document: dict[str, Any] = _documents.copied(self._document)
+        return document
 
     def as_json(self) -> str:
-        """Returns the text of the problem file."""
-        return json.dumps(self._document, indent=2, default=_plain)
+        """Returns the text of the problem file. Raises InvalidInput for what JSON does not have."""
+        return _documents.text_of(self._document)
 
     def save(self, path: Union[str, os.PathLike[str]]) -> None:
         """Writes the problem file, which the command `polyest` also reads.
@@ -251,14 +270,29 @@ class Problem:
 
     def __eq__(self, other: object) -> bool:
         """Whether two problems mean the same file."""
-        return isinstance(other, Problem) and to_message(self) == to_message(other)
+        if not isinstance(other, Problem):
+            return False
+        try:
+            return to_message(self) == to_message(other)
+        except InvalidInput:
+            return self._document == other._document
 
     def __repr__(self) -> str:
-        names = [str(entry.get("name")) for entry in self._document.get("uncertain", [])]
-        measured = [str(entry.get("output")) for entry in self._document.get("measured", [])]
-        return (f"<polyest.Problem: {json.dumps(self._document.get('model', {}))[:60]}, "
-                f"uncertain {', '.join(names) or 'none'}, "
-                f"measured {', '.join(measured) or 'none'}>")
+        def named(member: str, name: str) -> str:
+            entries = self._document.get(member)
+            found = [str(entry.get(name)) for entry in entries if isinstance(entry, dict)
+                     ] if isinstance(entries, list) else []
+            return ", ".join(found) or "none"
+
+        model = json.dumps(self._document.get("model", {}), default=repr)
+        return (f"<polyest.Problem: {model[:60]}, uncertain {named('uncertain', 'name')}, "
+                f"measured {named('measured', 'output')}>")
+
+
+def _text(argument: str, value: Any) -> str:
+    if not isinstance(value, str):
+        raise wrong(argument, value, "a text")
+    return value
 
 
 def _points(argument: str, points: Any) -> dict[str, list[float]]:
@@ -269,42 +303,13 @@ def _points(argument: str, points: Any) -> dict[str, list[float]]:
     return {"x": places, "value": values}
 
 
-def _plain(value: Any) -> Any:
-    """Returns a number or an array of numpy as JSON has it."""
-    if isinstance(value, (np.generic, np.ndarray)):
-        return value.tolist()
-    raise WrongType(f"{value!r} of the type {type(value).__name__} is nothing that JSON has",
-                    field="problem")
-
-
 #: A problem: built, as a problem file's JSON object, or the path of a problem file.
 ProblemLike = Union[Problem, Mapping[str, Any], str, "os.PathLike[str]", problem_pb2.Problem]
 
 
-def _read(path: Union[str, os.PathLike[str]]) -> dict[str, Any]:
-    # `open` takes a number for a descriptor, perhaps a connection's, and closes it in the end.
-    if not isinstance(path, (str, os.PathLike)):
-        raise WrongType("a problem must be a polyest.Problem, a dict, or the path of a problem "
-                        f"file (str or os.PathLike); got {path!r} of the type "
-                        f"{type(path).__name__}", field="problem")
-    try:
-        with open(path, encoding="utf-8-sig") as file:
-            document = _strict_json.loads(file.read())
-    except OSError as error:
-        raise InvalidInput(f"{os.fspath(path)}: cannot be opened: {error.strerror}") from error
-    except _strict_json.GivenTwice as error:
-        raise InvalidInput(f"{os.fspath(path)}: {error}", field=error.field,
-                           rule="given twice") from None
-    except ValueError as error:
-        raise InvalidInput(f"{os.fspath(path)}: {error}") from error
-    if not isinstance(document, dict):
-        raise InvalidInput(f"{os.fspath(path)}: the file must hold one JSON object")
-    return document
-
-
 def from_message(message: problem_pb2.Problem) -> Problem:
     """Returns the problem that a message holds."""
-    return Problem(json_format.MessageToDict(message))
+    return Problem(_documents.with_bounds(json_format.MessageToDict(message), message))
 
 
 def to_message(problem: ProblemLike) -> problem_pb2.Problem:
@@ -315,12 +320,13 @@ def to_message(problem: ProblemLike) -> problem_pb2.Problem:
     if isinstance(problem, Problem):
         document = problem.as_dict()
     elif isinstance(problem, Mapping):
-        document = copy.deepcopy(dict(problem))
+        document = _documents.copied(problem)
     else:
-        document, place = _read(problem), f"{os.fspath(problem)}: "
+        document, place = _documents.read(problem), f"{os.fspath(problem)}: "
     expansion = document.get("expansion")
     if isinstance(expansion, dict) and expansion.get("order") == "AUTO":
         del expansion["order"]  # what the word means in a problem file
     message = problem_pb2.Problem()
     _parsing.parse(document, message, place)
+    _documents.check_bounds(document, message, place)
     return message

@@ -137,12 +137,15 @@ def read_configuration(file: File, *, server: str = "") -> Configuration:
 
 def _parse(name: str) -> Any:
     try:
-        text = pathlib.Path(name).read_text(encoding="utf-8")
+        text = pathlib.Path(name).read_bytes()
         if name.endswith(".json"):
             return _strict_json.loads(text)
-        return _toml().loads(text)
+        return _toml().loads(text.decode())
     except OSError as error:
         raise InvalidInput(f"{name}: cannot be opened: {error.strerror}") from error
+    except _strict_json.JsonError as error:
+        raise InvalidInput(f"{name}:{error.line}:{error.column}: {error}", field=error.field,
+                           rule=error.rule) from None
     except ValueError as error:
         raise InvalidInput(f"{name}: {error}") from error
 
