@@ -174,3 +174,29 @@ def test_numbers_are_those_of_python_and_numpy():
     for value in (True, np.bool_(True), None, [1], "a"):
         with pytest.raises(polyest.WrongType, match="^n: "):
             _request.number("n", value)
+
+
+@pytest.mark.parametrize(("call", "said"), [
+    (lambda one: one.predict(times=[[1.0, 2.0]]),
+     r"times: has the shape \(1, 2\); times have one dimension"),
+    (lambda one: one.predict(run="a"), "run: 'a' of the type str must be a whole number"),
+    (lambda one: one.predict(times=[1.0], run=-1), "run: -1 must be a whole number ≥ 0"),
+    (lambda one: one.posterior(joints=5), "joints: 5 of the type int must be pairs of names"),
+    (lambda one: one.history(0), "points: 0 must be a whole number ≥ 1"),
+])
+def test_arguments_of_studies_are_not_passed_over(client, problem, rows, call, said):
+    with pytest.raises(polyest.InvalidInput, match=f"^{said}"):
+        call(client.experiment(problem, rows(0, 20)))
+
+
+def test_a_stream_is_not_begun_with_options_that_are_none(client, problem, rows):
+    for options, said in (({"options": {"batch_rows": 5}}, "options: .* must be a polyest.Stream"),
+                          ({"on_estimate": 5}, "on_estimate: 5 of the type int must be a function")):
+        with pytest.raises(polyest.WrongType, match=f"^{said}"):
+            client.session("not-begun", problem, **options)
+    with pytest.raises(polyest.NotFound):
+        client.session("not-begun")
+    session = client.session("end-of-run", problem)
+    with pytest.raises(polyest.WrongType, match="^end_of_run: 'no' of the type str must be True or"):
+        session.append(rows(0, 20), end_of_run="no")
+    assert session.append(rows(0, 20), end_of_run=np.bool_(True)) == 1

@@ -6,10 +6,11 @@ Synchronous and asynchronous clients run the same calls.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Generic, Optional, TypeVar, Union
 
+import numpy as np
 import numpy.typing as npt
 
 from polyest import _methods, _parsing, _session_file, check, estimates, results
@@ -21,8 +22,8 @@ from polyest._proto.v1 import (
     session_service_pb2,
     study_service_pb2,
 )
-from polyest._request import json_of, make, mapping, number, numbers, wrong
-from polyest._table import Data
+from polyest._request import json_of, make, mapping, number, numbers, whole, wrong
+from polyest._table import Data, refuse
 from polyest.errors import InvalidInput, WrongType
 from polyest.problem import ProblemLike, to_message
 from polyest.results import cost, design, history, posterior, prediction, prior
@@ -70,7 +71,7 @@ def compute_history(subject: Subject, points: int) -> Call[results.History]:
     """How the estimate of an experiment comes about."""
     return Call(_methods.COMPUTE_ESTIMATE,
                 make(study_service_pb2.ComputeEstimateRequest, subject=subject,
-                     history_point_count=points),
+                     history_point_count=whole("points", points, 1)),
                 lambda answer: history.of_message(answer.history))
 
 
@@ -137,10 +138,13 @@ def predict(subject: Subject, *, outputs: Sequence[str], probabilities: Sequence
         probabilities=probabilities, draw_count=draws, max_row_count=max_rows,
         lag_count=lags, horizon_s=horizon_s, smoothed=smoothed, forecast_s=forecast_s,
         first_scored_row=first_scored_row, record=record)
+    run = whole("run", run, 0)
     if times is not None:
-        for time_s in numbers("times", times).ravel():
-            request.times.append(make(study_service_pb2.RecordTime, run=run,
-                                      time_s=time_s))
+        values = np.atleast_1d(numbers("times", times))
+        if values.ndim > 1:
+            raise refuse("times", f"has the shape {values.shape}; times have one dimension")
+        request.times.extend(study_service_pb2.RecordTime(run=run, time_s=time_s)
+                             for time_s in values)
     return Call(_methods.PREDICT, request, prediction.of_message)
 
 
@@ -160,6 +164,8 @@ def compute_posterior(subject: Subject, *, probabilities: Sequence[float], densi
         study_service_pb2.ComputePosteriorRequest, subject=subject,
         probabilities=probabilities, density_bin_count=density_bins, joint_bin_count=joint_bins,
         sample_count=samples, all_joints=all_joints)
+    if isinstance(joints, str) or not isinstance(joints, Iterable):
+        raise wrong("joints", joints, 'pairs of names, as in [("k", "c")]')
     pair: Any
     for pair in joints:
         if isinstance(pair, str) or not isinstance(pair, Sequence) or len(pair) != 2:

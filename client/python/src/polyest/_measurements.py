@@ -12,7 +12,7 @@ from typing import Optional
 import numpy as np
 
 from polyest._proto.v1 import measurements_pb2, problem_pb2, session_service_pb2
-from polyest._request import texts
+from polyest._request import flag, texts
 from polyest._table import Array, Clock, Data, Floats, Table, floats, refuse, row_text
 from polyest.io._choices import nearest
 from polyest.io._recording import Batch, Recording
@@ -131,6 +131,7 @@ class MeasurementConverter:
 
         Raises InvalidInput for none: the daemon would refuse it with what is sent behind it.
         """
+        end_of_run = flag("end_of_run", end_of_run)
         if not isinstance(data, Recording):
             yield _with_rows(self.convert(data, end_of_run=end_of_run))
             return

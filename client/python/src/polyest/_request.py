@@ -74,6 +74,13 @@ def whole(argument: str, value: Any, least: int) -> int:
     return found
 
 
+def flag(argument: str, value: Any) -> bool:
+    """Returns a truth value. Raises WrongType, which names the argument, for another."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise wrong(argument, value, "True or False")
+    return bool(value)
+
+
 def numbers(argument: str, values: Any) -> Any:
     """Returns an array of numbers of any shape. Raises WrongType, which names the argument."""
     try:

@@ -11,11 +11,11 @@ from __future__ import annotations
 import secrets
 from collections import deque
 from dataclasses import dataclass
-from typing import Optional
+from typing import Any, Optional
 
 from polyest._proto.v1 import measurements_pb2, session_service_pb2
 from polyest._refusals import count_rows_from
-from polyest._request import at_least, whole
+from polyest._request import at_least, whole, wrong
 from polyest.errors import (
     Aborted,
     AlreadyExists,
@@ -59,6 +59,15 @@ class StreamOptions:
             whole("estimate_every", self.estimate_every, 1)
         for name in ("estimate_interval_s", "first_delay_s", "max_delay_s"):
             at_least(name, getattr(self, name), 0)
+
+
+def options_of(options: Optional[StreamOptions], on_estimate: Any) -> StreamOptions:
+    """Returns the options of a stream. Raises WrongType for what is none, or no function."""
+    if options is not None and not isinstance(options, StreamOptions):
+        raise wrong("options", options, "a polyest.StreamOptions")
+    if on_estimate is not None and not callable(on_estimate):
+        raise wrong("on_estimate", on_estimate, "a function that takes an estimate")
+    return options or StreamOptions()
 
 
 @dataclass(frozen=True)

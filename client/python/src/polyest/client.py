@@ -18,7 +18,7 @@ from polyest._proto.v1 import (
     session_service_pb2,
     status_service_pb2,
 )
-from polyest._resume import StreamOptions
+from polyest._resume import StreamOptions, options_of
 from polyest._table import Data
 from polyest._transport import Transport
 from polyest.errors import AlreadyExists
@@ -172,7 +172,7 @@ class Client:
         Raises NotFound without a problem, AlreadyExists if the session has another one, or
         another window than a given one.
         """
-        options = options or StreamOptions()
+        options = options_of(options, on_estimate)
         if problem is None:
             created = self._get_session(name)
         else:

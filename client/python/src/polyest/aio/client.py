@@ -17,7 +17,7 @@ from polyest._proto.v1 import (
     session_service_pb2,
     status_service_pb2,
 )
-from polyest._resume import StreamOptions
+from polyest._resume import StreamOptions, options_of
 from polyest._table import Data
 from polyest.aio.session import Session
 from polyest.aio.studies import Studies
@@ -118,7 +118,7 @@ class Client:
         on_estimate: called in the event loop with each estimate of the stream. What it raises, the
             next `append`, `flush` or `close` raises.
         """
-        options = options or StreamOptions()
+        options = options_of(options, on_estimate)
         if problem is None:
             created = await self._get_session(name)
         else:
