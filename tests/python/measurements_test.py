@@ -214,6 +214,12 @@ def test_dates_without_a_time_zone_are_in_none(monkeypatch):
     time.tzset()
 
 
+def test_a_time_of_day_is_no_date():
+    with pytest.raises(polyest.InvalidInput, match=r"^t: row 0 \(counted from 0\): .* of the type "
+                       "time must be a date with its time"):
+        converter().convert({"t": [datetime.time(1, 2, 3)], "x": [1.0]})
+
+
 def test_a_date_that_is_missing_does_not_begin_the_time():
     one, dates = converter(), np.array(["NaT", "2026-01-31T13:00:05"], dtype="datetime64[ns]")
     with pytest.raises(polyest.InvalidInput, match=r"t: row 0 \(counted from 0\) has no time"):

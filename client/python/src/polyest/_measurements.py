@@ -14,6 +14,7 @@ import numpy as np
 from polyest._proto.v1 import measurements_pb2, problem_pb2, session_service_pb2
 from polyest._request import flag, texts
 from polyest._table import Array, Clock, Data, Floats, Table, floats, refuse, row_text
+from polyest._time_columns import may_be_time, parts_of
 from polyest.io._choices import nearest
 from polyest.io._recording import Batch, Recording
 
@@ -141,18 +142,34 @@ class MeasurementConverter:
             yield Measurements(end_of_run=True)
 
     def _times(self, table: Table, used: list[str]) -> Floats:
-        found = self._find(table, "t")
-        column: Optional[Array]
-        header, unit, column = found or ("t", self._units.get("t", ""), table.time("t"))
-        if column is None:
-            for header in ("time", "Time"):
-                column = table.time(header)
-                if column is not None:
-                    break
-        if column is None:
-            raise refuse("t", f"no column of the time; the columns are {_listed(table.columns)}")
+        header, unit, column = self._find_time(table)
         used.append(header)
         return self._clock.seconds(header, column, unit)
+
+    def _find_time(self, table: Table) -> tuple[str, str, Array]:
+        """Returns header, unit and values of the time."""
+        source, unit = self._sources.get("t", ("", ""))
+        found = self._find(table, "t") if source else None
+        if found is not None:
+            return found
+        given = self._units.get("t", unit)
+        taken = {*self.names, "run", *(header for header, _ in self._sources.values())}
+        parts = {header: parts_of(header) for header in table.columns}
+        may_be = [] if source else [header for header, (name, _) in parts.items()
+                                    if not taken & {header, name} and may_be_time(header)]
+        exact = [header for header in may_be if header == "t"] or [
+            header for header in may_be if parts[header][0] == "t"]
+        index = None if exact else table.index_of_times(source)
+        if index is not None:
+            return index[0], given or parts_of(index[0])[1], index[1]
+        one = _only_one(table, "t", given,
+                        [(header, parts[header][1]) for header in exact or may_be])
+        if one is not None:
+            return one
+        if source:
+            raise refuse("columns.t", f"there is no column '{source}'; the columns are "
+                         f"{_listed(table.columns)}")
+        raise refuse("t", f"no column of the time; the columns are {_listed(table.columns)}")
 
     def _check_first_date(self, message: Measurements) -> None:
         """Refuses dates that count from a row in the middle of a run of the session."""

@@ -11,6 +11,7 @@ from typing import Any, Optional, Union
 import numpy as np
 import numpy.typing as npt
 
+from polyest._time_columns import may_be_time
 from polyest.errors import InvalidInput
 
 Array = npt.NDArray[Any]
@@ -99,16 +100,17 @@ class Table:
             raise refuse("measurements", f"columns differ in length: {said}")
         return next(iter(lengths.values()), 0)
 
-    def time(self, name: str) -> Optional[Array]:
-        """Returns the column of the time: `name`, or the index if that is one of times."""
-        if name in self.columns:
-            return self.columns[name]
+    def index_of_times(self, name: str = "") -> Optional[tuple[str, Array]]:
+        """Returns the name and the values of the index if it is one of times; else None.
+
+        It is if it has dates or time differences, the name of a time, or else `name`.
+        """
         if self._index is None:
             return None
         dates = self._index.dtype.kind in "mM" or _has_zone(self._index)
-        if dates or self._index_name in (name, "t", "time"):
-            return self._index
-        return None
+        named = bool(self._index_name) and (self._index_name == name
+                                            or may_be_time(self._index_name))
+        return (self._index_name or "t", self._index) if dates or named else None
 
 
 def _array(name: str, values: Any) -> Array:
@@ -146,12 +148,26 @@ def _has_zone(values: Array) -> bool:
     return values.dtype == object and len(values) > 0 and hasattr(values[0], "tzinfo")
 
 
+def _has_texts(values: Array) -> bool:
+    return values.dtype.kind in "US" or (values.dtype == object and any(
+        isinstance(value, str) for value in values))
+
+
 def _nanoseconds(date: Any) -> np.datetime64:
     """Returns a date; one without a time zone counts as numpy and pandas have it, in no zone."""
     value = getattr(date, "value", None)  # what pandas has in nanoseconds
     if value is None and getattr(date, "tzinfo", None) is not None:
         date = date.astimezone(datetime.timezone.utc).replace(tzinfo=None)
     return np.datetime64(date if value is None else value, "ns")
+
+
+def _dates(name: str, values: Array) -> Array:
+    """Returns dates that are objects as numpy has them. Raises InvalidInput for other objects."""
+    for row, value in enumerate(values):
+        if not isinstance(value, (datetime.datetime, np.datetime64)) and value is not None:
+            raise refuse(name, f"{row_text(row)}: {value!r} of the type {type(value).__name__} "
+                         "must be a date with its time, as others are")
+    return np.array([_nanoseconds(value) for value in values])
 
 
 def floats(name: str, values: Array) -> Floats:
@@ -190,7 +206,11 @@ class Clock:
     def seconds(self, name: str, values: Array, unit: str) -> Floats:
         """Returns times in s. `values` are numbers in `unit`, time differences or dates."""
         if _has_zone(values):
-            values = np.array([_nanoseconds(value) for value in values])
+            values = _dates(name, values)
+        elif _has_texts(values):
+            _refuse_decimal_comma(name, values)
+            raise refuse(name, "has texts; times are numbers, dates or time differences, and "
+                         "pandas.to_datetime reads the texts of dates")
         if values.dtype.kind == "M":
             _check_present(name, np.isnat(values))
             if self._origin is None and len(values):
