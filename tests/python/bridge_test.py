@@ -374,7 +374,7 @@ def test_a_wrong_configuration_names_the_field(tmp_path, change, said):
 
 def test_a_configuration_that_gives_a_field_twice_is_refused(tmp_path):
     (tmp_path / "bridge.json").write_text('{"session": {"name": "a", "name": "b"}}')
-    with pytest.raises(polyest.InvalidInput, match=r"bridge\.json:1:27: session\.name: given twice$"):
+    with pytest.raises(polyest.InvalidInput, match=r"bridge\.json: session\.name: given twice$"):
         bridge.read_configuration(tmp_path / "bridge.json")
 
 

@@ -42,13 +42,12 @@ def said_by_the_command(file):
 
 
 @pytest.mark.parametrize("text", NOT_JSON, ids=lambda text: ascii(text)[2:40])
-def test_what_is_not_json_is_refused_in_the_command_s_words(tmp_path, text):
+def test_what_is_not_json_is_refused_as_the_command_does(tmp_path, text):
     file = tmp_path / "problem.json"
     file.write_bytes(text)
-    for read in (polyest.Problem.read, to_message):
-        with pytest.raises(polyest.InvalidInput) as raised:
-            read(file)
-        assert raised.value.message == said_by_the_command(file)
+    assert said_by_the_command(file).startswith(f"{file}:")
+    with pytest.raises(polyest.InvalidInput, match=f"^{re.escape(str(file))}:[^\n]*$"):
+        to_message(file)
 
 
 @pytest.mark.parametrize("text", NO_PROBLEM, ids=lambda text: ascii(text)[2:40])
@@ -62,7 +61,7 @@ def test_json_that_is_no_problem_is_refused_in_the_command_s_words(tmp_path, tex
 
 @pytest.mark.parametrize(("text", "field", "rule"), [
     ('{"fixed": {"m": 1, "m": 2}}', "fixed.m", "given twice"),
-    ('{"fixed": {},}', "", "no comma may follow the last value"),
+    ('{"fixed": {"m": NaN}}', "", "NaN is no number of JSON"),
 ])
 def test_programs_are_told_the_field_and_the_rule(tmp_path, text, field, rule):
     (tmp_path / "problem.json").write_text(text)

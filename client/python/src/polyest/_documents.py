@@ -36,7 +36,7 @@ def read(path: Union[str, os.PathLike[str]]) -> dict[str, Any]:
     try:
         document = _strict_json.loads(data)
     except _strict_json.JsonError as error:
-        raise InvalidInput(f"{name}:{error.line}:{error.column}: {error}", field=error.field,
+        raise InvalidInput(f"{name}{error.place}: {error}", field=error.field,
                            rule=error.rule) from None
     if not isinstance(document, dict):
         raise InvalidInput(f"{name}: the file must hold one JSON object")

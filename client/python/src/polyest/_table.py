@@ -11,7 +11,7 @@ from typing import Any, Optional, Union
 import numpy as np
 import numpy.typing as npt
 
-from polyest._time_columns import may_be_time
+from polyest._time_columns import SECONDS, may_be_time, seconds_of
 from polyest.errors import InvalidInput
 
 Array = npt.NDArray[Any]
@@ -24,18 +24,6 @@ Data = Union[Mapping[str, npt.ArrayLike], Array, Any]
 
 _DECIMAL_COMMA = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?")
 
-# Seconds in each unit of time, and how measuring systems spell the units.
-_SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6, "ns": 1e-9, "min": 60.0,
-            "h": 3600.0}
-_SPELLINGS = {
-    "s": ("sec", "secs", "second", "seconds", "sekunde", "sekunden"),
-    "ms": ("msec", "msecs", "millisecond", "milliseconds", "millisekunden"),
-    "us": ("usec", "usecs", "µsec", "μsec", "microsecond", "microseconds", "mikrosekunden"),
-    "ns": ("nsec", "nsecs", "nanosecond", "nanoseconds", "nanosekunden"),
-    "min": ("min", "mins", "minute", "minutes", "minuten"),
-    "h": ("hr", "hrs", "hour", "hours", "std", "stunde", "stunden"),
-}
-
 
 def refuse(field: str, rule: str) -> InvalidInput:
     """Returns the exception for data that break a rule."""
@@ -43,16 +31,11 @@ def refuse(field: str, rule: str) -> InvalidInput:
 
 
 def seconds_in(field: str, unit: str) -> float:
-    """Returns the length of a unit of time, s; "" is the second. Raises InvalidInput.
-
-    Words may have any case, and symbols capitals throughout: "Ms" is no ms.
-    """
-    given = unit.strip() or "s"
-    symbol = given.lower() if given.isupper() else given
-    known = next((one for one, words in _SPELLINGS.items() if given.lower() in words), symbol)
-    if known not in _SECONDS:
-        raise refuse(field, f"'{unit}' is no unit of time; known are {', '.join(_SECONDS)}")
-    return _SECONDS[known]
+    """Returns the length of a unit of time, s; "" is the second. Raises InvalidInput."""
+    found = seconds_of(unit)
+    if found is None:
+        raise refuse(field, f"'{unit}' is no unit of time; known are {', '.join(SECONDS)}")
+    return found
 
 
 def row_text(row: int) -> str:

@@ -144,7 +144,7 @@ def _parse(name: str) -> Any:
     except OSError as error:
         raise InvalidInput(f"{name}: cannot be opened: {error.strerror}") from error
     except _strict_json.JsonError as error:
-        raise InvalidInput(f"{name}:{error.line}:{error.column}: {error}", field=error.field,
+        raise InvalidInput(f"{name}{error.place}: {error}", field=error.field,
                            rule=error.rule) from None
     except ValueError as error:
         raise InvalidInput(f"{name}: {error}") from error
