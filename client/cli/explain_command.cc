@@ -46,11 +46,9 @@ std::string DescribePieces(const v1::ParameterEstimate& p, absl::string_view ver
                            const std::string& unit) {
   return absl::StrFormat(
       "%s is %s: several separate values fit the data. About the most probable one it is %s%s, "
-      "over "
-      "all of them %s%s. A prior on one side of %s, or a measurement that tells them apart, would "
-      "decide between them.",
-      p.name(), verdict, FormatUncertain(p.map(), p.std_dev()), unit, EstimateText(p), unit,
-      p.name());
+      "over all of them %s%s. A prior that excludes all but one, or a measurement that tells them "
+      "apart, would decide between them.",
+      p.name(), verdict, FormatUncertain(p.map(), p.std_dev()), unit, EstimateText(p), unit);
 }
 
 // Returns a sentence about the information that the data give about one parameter.

@@ -176,6 +176,26 @@ TEST_F(ExplainTest, NamesTheExcitationToChange) {
                     HasSubstr("Another excitation, only u"), HasSubstr(" would determine I to ±")));
 }
 
+// The data tell a² and not its sign.
+TEST_F(ExplainTest, SaysThatSeveralValuesFit) {
+  const std::string problem = File("problem.json", R"({
+    "model": {"equations": {"outputs": {"y": "a^2"}}},
+    "uncertain": [{"name": "a", "uniform": {"lower": -1.5, "upper": 1}}],
+    "measured": [{"output": "y", "noise": {"absolute": 0.01}}]
+  })");
+  const std::string data = File("data.csv", "t,y\n0,0.64\n1,0.65\n2,0.63\n");
+  const Finished run = Run({"explain", problem, data, "--no-remedies"});
+  EXPECT_EQ(run.exit_status, 0) << run.err;
+  EXPECT_THAT(run.out,
+              AllOf(HasSubstr("a is weakly identified: several separate values fit the data. About "
+                              "the most probable one it is "),
+                    HasSubstr("0.8000 ± 0.0036, over all of them "),
+                    HasSubstr("the cost has other minima of comparable depth at a = "),
+                    Not(HasSubstr("should identify"))));
+  const Finished estimate = Run({"estimate", problem, data});
+  EXPECT_THAT(estimate.out, AllOf(HasSubstr(" ± 0.80 "), HasSubstr("  weak\n")));
+}
+
 TEST_F(ExplainTest, HasNothingToAddWhereAllIsIdentified) {
   const Finished run = Run({"explain", Example("oscillator.json"), Example("oscillator.csv")});
   EXPECT_EQ(run.exit_status, 0);
