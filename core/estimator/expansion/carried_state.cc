@@ -158,11 +158,9 @@ class Substitution {
 
   // Returns what the polynomial fitted to the values of the collocation points (the first rows) is
   // at the new points. Below them, the new control trajectories differ from their check points as
-  // the old ones did.
-  absl::StatusOr<Matrix> AtNewPoints(const Matrix& values) const {
+  // the old ones did. `fit` is the collocation matrix of the old points.
+  Matrix AtNewPoints(const Matrix& values, CollocationMatrix& fit) const {
     const Eigen::Index points = before_.points.rows();
-    POLYEST_ASSIGN_OR_RETURN(CollocationMatrix fit,
-                             CollocationMatrix::Factor(*before_.basis, before_.points, stop_));
     Matrix coefficients(phi_.cols(), values.cols());
     Vector residual(values.cols());
     fit.Solve(values.topRows(points), coefficients, residual);
@@ -181,11 +179,11 @@ class Substitution {
     TrajectoryState state;
     for (int q = 0; q < static_cast<int>(first_check_); ++q) state.kept.push_back(q);
     state.run = before.run;
+    POLYEST_ASSIGN_OR_RETURN(CollocationMatrix fit,
+                             CollocationMatrix::Factor(*before_.basis, before_.points, stop_));
     for (const PreviousSample& sample : before.previous) {
       PreviousSample& moved = state.previous.emplace_back(sample);
-      Matrix outputs = sample.output;
-      POLYEST_ASSIGN_OR_RETURN(outputs, AtNewPoints(outputs));
-      moved.output = outputs.col(0);
+      moved.output = AtNewPoints(sample.output, fit).col(0);
     }
     if (!before.ensemble) return state;
     const Matrix own = InterpolableStates(problem_, *before.ensemble);
@@ -194,7 +192,7 @@ class Substitution {
     if (before.controls) {
       states.bottomRows(old_controls()) = InterpolableStates(problem_, *before.controls);
     }
-    POLYEST_ASSIGN_OR_RETURN(const Matrix moved, AtNewPoints(states));
+    const Matrix moved = AtNewPoints(states, fit);
     state.ensemble = WithInterpolated(problem_, *before.ensemble, moved.topRows(phi_.rows()));
     if (controls_ > 0) {
       state.controls = WithInterpolated(problem_, *before.controls, moved.bottomRows(controls_));
