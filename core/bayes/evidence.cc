@@ -5,7 +5,6 @@
 #include <limits>
 #include <numeric>
 #include <random>
-#include <utility>
 #include <vector>
 
 #include "core/bayes/weighted_samples.h"
@@ -65,9 +64,7 @@ Matrix Chosen(const Matrix& draws, const Vector& weights) {
   std::vector<Eigen::Index> order(static_cast<size_t>(weights.size()));
   std::iota(order.begin(), order.end(), Eigen::Index{0});
   std::mt19937_64 generator;  // with its default seed
-  for (size_t i = order.size() - 1; i > 0; --i) {
-    std::swap(order[i], order[static_cast<size_t>(generator() % (i + 1))]);
-  }
+  Shuffle(order, generator);
   std::vector<Eigen::Index> rows = EquallyWeighted(weights(order), kPoints);
   for (Eigen::Index& row : rows) row = order[static_cast<size_t>(row)];
   return draws(rows, Eigen::all);

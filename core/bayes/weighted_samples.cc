@@ -176,4 +176,10 @@ std::vector<Eigen::Index> StratifiedDraws(const ConstVectorRef& weights, int cou
   });
 }
 
+void Shuffle(std::vector<Eigen::Index>& rows, std::mt19937_64& generator) {
+  for (size_t end = rows.size(); end > 1; --end) {
+    std::swap(rows[end - 1], rows[static_cast<size_t>(generator() % end)]);
+  }
+}
+
 }  // namespace polyest::internal

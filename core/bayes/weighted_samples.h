@@ -2,6 +2,7 @@
 
 // Summaries of weighted draws x_i, w_i ≥ 0, Σ w = 1.
 
+#include <random>
 #include <vector>
 
 #include "core/common/types.h"
@@ -46,5 +47,8 @@ std::vector<Eigen::Index> EquallyWeighted(const ConstVectorRef& weights, int cou
 // the weight, by a golden-ratio sequence. For few draws that stand for all: where these are a
 // low-discrepancy sequence, evenly spaced pointers go in step with it and miss whole layers.
 std::vector<Eigen::Index> StratifiedDraws(const ConstVectorRef& weights, int count);
+
+// Puts rows in a random order (Fisher and Yates).
+void Shuffle(std::vector<Eigen::Index>& rows, std::mt19937_64& generator);
 
 }  // namespace polyest::internal

@@ -73,9 +73,7 @@ void DrawFromModes(const Cost& cost, int points, const Stop& stop, ModeSearch& s
 Particles Resampled(const WeightedDraws& draws, int count, uint64_t seed) {
   std::vector<Eigen::Index> rows = EquallyWeighted(draws.weights, count);
   std::mt19937_64 generator(seed);
-  for (size_t i = rows.size() - 1; i > 0; --i) {
-    std::swap(rows[i], rows[static_cast<size_t>(generator() % (i + 1))]);
-  }
+  Shuffle(rows, generator);
   return {draws.etas(rows, Eigen::all), draws.costs(rows)};
 }
 
