@@ -90,6 +90,12 @@ double NegativeLogLikelihood(double degrees, double chi_squared, double differen
   return Evaluate(degrees, chi_squared, differences, scale_unknown, correlation_unknown).value;
 }
 
+double ChannelSums::Weight(const ConstVectorRef& d) const {
+  if (!scale_unknown) return 1;
+  const double chi_squared = samples.ChiSquared(d);
+  return chi_squared > 0 ? Degrees() / chi_squared : 1;
+}
+
 double ChannelSums::Lag1Correlation(const ConstVectorRef& d) const {
   return samples.count() == 0 ? 0
                               : LagCorrelation(samples.ChiSquared(d), differences.ChiSquared(d));

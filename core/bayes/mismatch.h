@@ -74,6 +74,9 @@ struct ChannelSums {
   // Returns the χ² whose −log of the likelihood is that of `chi_squared` plus ½ L, L = Σ
   // log(R_k/R⁰_k) being `logs`. With known noise it may be below 0.
   double WithLogVariance(double chi_squared, double logs) const;
+  // Returns by how much χ²/2 counts in the cost at d: N/χ² for an unknown scale, which is the one
+  // that the residuals have there, and 1 for a known one.
+  double Weight(const ConstVectorRef& d) const;
   // Returns r at d, in [−1, 1]; 0 without samples.
   double Lag1Correlation(const ConstVectorRef& d) const;
 };

@@ -12,35 +12,23 @@ namespace {
 constexpr double kControlWeight = 1e-3;   // that counts, relative to the heaviest check point
 constexpr double kMinEigenvalue = 1e-14;  // relative to the largest
 
-// Returns by how much each channel's χ²/2 counts in the cost at d: an unknown scale is the one that
-// the residuals have there.
-Vector ChannelWeights(const RegionalExpansion& expansion, const Vector& d) {
-  const std::vector<ChannelSums>& sums = expansion.sums();
-  Vector weights = Vector::Ones(std::ssize(sums));
-  for (size_t c = 0; c < sums.size(); ++c) {
-    if (!sums[c].scale_unknown) continue;
-    const double chi_squared = sums[c].samples.ChiSquared(d);
-    if (chi_squared > 0) weights[static_cast<Eigen::Index>(c)] = sums[c].Degrees() / chi_squared;
-  }
-  return weights;
-}
-
 double ShiftAt(const RegionalExpansion& expansion, const Cost& cost, int control) {
   const ExpansionDesign& design = expansion.design();
   const Vector eta = design.check_points.row(control).transpose();
   Vector phi(design.basis->size());
   Matrix slope(design.basis->size(), eta.size());  // ∂φ
   design.basis->EvaluateWithGradient(eta, phi, slope);
-  const Vector weights = cost.power() * ChannelWeights(expansion, cost.BasisDifference(eta));
+  const Vector d = cost.BasisDifference(eta);
   // The prior's precision in local coordinates: ξ = centre + axes η.
   const Matrix axes =
       cost.prior().GermStandardDeviation().cwiseInverse().asDiagonal() * design.region.axes();
   Matrix hessian = axes.transpose() * axes;
   Vector score = Vector::Zero(eta.size());
   for (int c = 0; c < static_cast<int>(expansion.sums().size()); ++c) {
-    const MismatchSums& sums = expansion.sums()[static_cast<size_t>(c)].samples;
-    hessian += weights[c] * (slope.transpose() * (sums.G() * slope));
-    score += weights[c] * (slope.transpose() * expansion.ControlScore(control, c));
+    const ChannelSums& sums = expansion.sums()[static_cast<size_t>(c)];
+    const double weight = cost.power() * sums.Weight(d);
+    hessian += weight * (slope.transpose() * (sums.samples.G() * slope));
+    score += weight * (slope.transpose() * expansion.ControlScore(control, c));
   }
   if (!hessian.allFinite() || !score.allFinite()) return 0;
   // √(sᵀ H⁻¹ s)

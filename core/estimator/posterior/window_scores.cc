@@ -17,18 +17,16 @@ void Append(const WindowScore& next, WindowScore& window) {
   window.information += next.information;
 }
 
-// Returns by how much the residuals of each group of channels are to be weighed more: N/χ² for a
-// channel with a learned scale, 1 for all others.
+// Returns the weight of each group of channels (WindowSums::TotalsAt).
 std::vector<double> GroupWeights(const std::vector<ChannelSums>& sums, const Vector& difference) {
   std::vector<double> weights;
   bool any_known = false;
   for (const ChannelSums& channel : sums) {
-    if (!channel.scale_unknown) {
+    if (channel.scale_unknown) {
+      weights.push_back(channel.Weight(difference));
+    } else {
       any_known = true;
-      continue;
     }
-    const double chi_squared = channel.samples.ChiSquared(difference);
-    weights.push_back(chi_squared > 0 ? channel.Degrees() / chi_squared : 1);
   }
   if (any_known) weights.insert(weights.begin(), 1.0);
   return weights;
