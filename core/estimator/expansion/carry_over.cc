@@ -8,7 +8,7 @@
 #include "core/common/infeasible.h"
 #include "core/common/status.h"
 #include "core/estimator/expansion/carried_state.h"
-#include "core/estimator/expansion/reexpansion.h"
+#include "core/estimator/expansion/replay.h"
 #include "core/estimator/expansion/state_pairs.h"
 #include "core/propagation/ensemble_points.h"
 

@@ -4,6 +4,7 @@
 
 #include "core/common/infeasible.h"
 #include "core/estimator/expansion/carry_over.h"
+#include "core/estimator/expansion/replay.h"
 
 namespace polyest::internal {
 

@@ -14,6 +14,7 @@
 #include "core/common/status.h"
 #include "core/estimator/expansion/carry_over.h"
 #include "core/estimator/expansion/model_agreement.h"
+#include "core/estimator/expansion/replay.h"
 #include "core/estimator/expansion/search_domain.h"
 #include "core/estimator/problem/truncation.h"
 

@@ -76,18 +76,4 @@ absl::StatusOr<Reexpansion> Reexpand(const RegionalExpansion& present,
 absl::StatusOr<Reexpansion> ContinueReexpansion(const RegionalExpansion& present, Reexpansion begun,
                                                 ReexpansionRequest request, const Stop& stop);
 
-// Makes an expansion of the design and lets it absorb the first `rows` rows of the store, from
-// problem.first_row() on. Returns InfeasibleError when its collocation matrix cannot be factored
-// or too few trajectories are left.
-absl::StatusOr<std::unique_ptr<RegionalExpansion>> Replay(const ResolvedProblem& problem,
-                                                          ExpansionDesign design,
-                                                          LearnedNoise noise,
-                                                          const SampleStore& store, int64_t rows,
-                                                          int threads, const Stop& stop);
-
-// Lets the expansion absorb further rows of the store, up to the first `rows`. Returns
-// InfeasibleError when too few trajectories are left.
-absl::Status TakeRows(const SampleStore& store, int64_t rows, const Stop& stop,
-                      RegionalExpansion& expansion);
-
 }  // namespace polyest::internal

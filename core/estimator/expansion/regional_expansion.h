@@ -83,6 +83,7 @@ class RegionalExpansion {
   void Absorb(int row);
   // Sets the row of the store that is the first to be propagated; no row has been yet.
   void BeginAt(int64_t row) { trajectories_.BeginAt(row); }
+  int64_t next_row() const { return trajectories_.next_row(); }  // to be propagated
   // Returns how many rows of a block that follows the rows propagated, at least one, to propagate
   // with the next call so that it ends where a state can be kept.
   int RowsToKeptState(const RowBlock& block) const;
@@ -103,8 +104,7 @@ class RegionalExpansion {
   bool StepsExactly() const { return trajectories_.StepsExactly(); }
   int points() const { return trajectories_.points(); }
   int64_t absorbed_rows() const { return absorbed_.rows; }
-  // Returns the number of trajectories × rows.
-  int64_t propagated_rows() const { return absorbed_.propagated; }
+  int64_t propagated_rows() const { return absorbed_.propagated; }  // trajectories × rows
   const std::vector<FailedTrajectory>& failures() const { return trajectories_.failures(); }
   // Returns the indices of the collocation points that are still in the fit, ascending.
   const std::vector<int>& kept_points() const { return trajectories_.kept(); }

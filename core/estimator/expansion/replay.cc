@@ -1,10 +1,9 @@
-// Lets expansions absorb rows of the record again (reexpansion.h).
+#include "core/estimator/expansion/replay.h"
 
 #include <algorithm>
 #include <utility>
 
 #include "core/common/status.h"
-#include "core/estimator/expansion/reexpansion.h"
 
 namespace polyest::internal {
 namespace {
@@ -25,11 +24,11 @@ absl::StatusOr<std::unique_ptr<RegionalExpansion>> Replay(const ResolvedProblem&
   return expansion;
 }
 
-absl::Status TakeRows(const SampleStore& store, int64_t rows, const Stop& stop,
+absl::Status TakeRows(const SampleStore& store, int64_t end, const Stop& stop,
                       RegionalExpansion& expansion) {
   RowBlock block;
-  for (int64_t first = expansion.absorbed_rows(); first < rows; first += block.count()) {
-    const int64_t count = std::min(kReplayRows, rows - first);
+  for (int64_t first = expansion.next_row(); first < end; first += block.count()) {
+    const int64_t count = std::min(kReplayRows, end - first);
     POLYEST_RETURN_IF_ERROR(store.Read(first, count, block));
     const int kept = expansion.RowsToKeptState(block);
     if (kept < count) POLYEST_RETURN_IF_ERROR(store.Read(first, kept, block));

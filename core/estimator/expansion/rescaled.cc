@@ -8,7 +8,7 @@
 #include "core/common/infeasible.h"
 #include "core/common/status.h"
 #include "core/estimator/expansion/expansion_state.h"
-#include "core/estimator/expansion/reexpansion.h"
+#include "core/estimator/expansion/replay.h"
 
 namespace polyest::internal {
 namespace {

@@ -8,6 +8,7 @@
 #include "core/common/status.h"
 #include "core/estimator/expansion/likelihood_power.h"
 #include "core/estimator/expansion/model_agreement.h"
+#include "core/estimator/expansion/replay.h"
 #include "core/estimator/problem/truncation.h"
 
 namespace polyest::internal {

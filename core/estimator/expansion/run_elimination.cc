@@ -12,6 +12,7 @@
 #include "core/common/linear_algebra.h"
 #include "core/common/status.h"
 #include "core/estimator/expansion/population_of_runs.h"
+#include "core/estimator/expansion/replay.h"
 #include "core/estimator/expansion/run_marginal.h"
 #include "core/estimator/problem/truncation.h"
 
@@ -20,7 +21,6 @@ namespace {
 
 constexpr double kHalfWidth = 4;  // of the region of a run's own germs, standard deviations
 constexpr int kMaxEliminations = 5;
-constexpr int64_t kRowsAtOnce = 256;
 constexpr int kPointsPerTerm = 3;  // of the shared germs
 constexpr double kWithinDomain = 1 - 1e-9;
 // What a population is told of a run that is expanded over all that its own data leave open: the
@@ -78,8 +78,6 @@ class Elimination {
   Truncation truncation_;
   std::unique_ptr<RegionalExpansion> expansion_;
   RunPath path_;
-  int run_ = 0;
-  double start_s_ = 0, end_s_ = 0;          // times of its first and last row
   Matrix points_;                           // of the shared germs, local coordinates
   std::vector<ConditionalMinimum> minima_;  // at the points, then at the centre
   std::optional<ScoreLikelihood> score_;    // at the centre, of a run in a population
@@ -128,16 +126,7 @@ absl::Status Elimination::Expand(const RunPath& path, const SampleStore& store, 
   POLYEST_ASSIGN_OR_RETURN(expansion_, RegionalExpansion::Make(problem_, &store, std::move(design),
                                                                NoiseAbout(centre), threads, stop));
   expansion_->BeginAt(rows.first);
-  run_ = rows.run;
-  RowBlock block;
-  for (int64_t first = rows.first; first < rows.end; first += kRowsAtOnce) {
-    POLYEST_RETURN_IF_ERROR(store.Read(first, std::min(kRowsAtOnce, rows.end - first), block));
-    POLYEST_RETURN_IF_ERROR(expansion_->Propagate(block, stop));
-    if (expansion_->fitted_rows() < block.count()) return expansion_->shortage();
-    for (int row = 0; row < block.count(); ++row) expansion_->Absorb(row);
-    if (first == rows.first) start_s_ = block.rows.front().time_s;
-    end_s_ = block.rows.back().time_s;
-  }
+  POLYEST_RETURN_IF_ERROR(TakeRows(store, rows.end, stop, *expansion_));
   expansion_->EndRun();
   return absl::OkStatus();
 }
@@ -359,8 +348,10 @@ absl::Status Elimination::AddTo(const RunPath& path, const Stop& stop, EndedRuns
   ended.remainder += coefficients.col(0);
   expansion_->AddCountsTo(ended);
   if (!score_) {
-    ended.windows.EndRow(SumsWithRemainder(problem_.problem().measured, ended), run_, start_s_,
-                         end_s_);
+    const WindowSums& windows = expansion_->windows();
+    const WindowSpan &first = windows.span(0), &last = windows.span(windows.count() - 1);
+    ended.windows.EndRow(SumsWithRemainder(problem_.problem().measured, ended), first.first_run,
+                         first.start_s, last.end_s);
   } else {
     TellPopulation(problem_, cost, path, *score_, ended);
     const double own_error = expansion_->absorbed().OwnError();

@@ -8,6 +8,7 @@
 #include "core/common/status.h"
 #include "core/estimator/expansion/germ_summary.h"
 #include "core/estimator/expansion/reexpansion.h"
+#include "core/estimator/expansion/replay.h"
 #include "core/estimator/posterior/bisection.h"
 #include "core/estimator/posterior/least_linear.h"
 #include "core/estimator/posterior/mixture_component.h"

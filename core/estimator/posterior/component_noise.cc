@@ -10,7 +10,7 @@
 #include "core/common/status.h"
 #include "core/estimator/expansion/carry_over.h"
 #include "core/estimator/expansion/control_trajectories.h"
-#include "core/estimator/expansion/reexpansion.h"
+#include "core/estimator/expansion/replay.h"
 #include "core/estimator/expansion/rescaled.h"
 #include "core/estimator/posterior/misfit.h"
 #include "core/estimator/posterior/mixture_component.h"

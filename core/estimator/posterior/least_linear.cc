@@ -6,7 +6,7 @@
 #include "core/chaos/multi_index.h"
 #include "core/common/infeasible.h"
 #include "core/common/linear_algebra.h"
-#include "core/estimator/expansion/reexpansion.h"
+#include "core/estimator/expansion/replay.h"
 
 namespace polyest::internal {
 namespace {

@@ -12,6 +12,7 @@
 #include "core/estimator/expansion/new_runs.h"
 #include "core/estimator/expansion/prior_prediction.h"
 #include "core/estimator/expansion/reexpansion.h"
+#include "core/estimator/expansion/replay.h"
 #include "core/estimator/expansion/return_to_prior.h"
 #include "core/estimator/posterior/noise_learning.h"
 

@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "core/estimator/expansion/expansion_state.h"
-#include "core/estimator/expansion/reexpansion.h"
+#include "core/estimator/expansion/replay.h"
 #include "core/estimator/posterior/noise_learning.h"
 #include "core/estimator/record/memory_store.h"
 #include "tests/testing/records.h"

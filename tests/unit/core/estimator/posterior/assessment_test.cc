@@ -7,7 +7,7 @@
 #include <optional>
 #include <vector>
 
-#include "core/estimator/expansion/reexpansion.h"
+#include "core/estimator/expansion/replay.h"
 #include "core/estimator/posterior/noise_learning.h"
 #include "core/estimator/record/memory_store.h"
 #include "tests/unit/core/estimator/text_problem.h"
