@@ -1,8 +1,10 @@
 #include "core/bayes/mismatch_sums.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "core/common/check.h"
+#include "core/common/finite_matrix.h"
 
 namespace polyest::internal {
 namespace {
@@ -24,6 +26,11 @@ void MismatchSums::Add(const ConstVectorRef& coefficients, double error, double 
   b_ += (weight * error) * coefficients;  // b += c e/R
   w_ += weight * error * error;           // w += e²/R
   ++count_;
+}
+
+bool MismatchSums::IsValid(int terms) const {
+  return IsFiniteMatrix(G(), terms, terms) && IsFiniteMatrix(b_, terms) && std::isfinite(w_) &&
+         count_ >= 0;
 }
 
 const Matrix& MismatchSums::G() const {

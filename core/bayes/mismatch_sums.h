@@ -44,6 +44,9 @@ class MismatchSums {
   // all divided by `variance`, a factor of the noise's variance. `t` is S′ × S, `shift` = δ (S).
   MismatchSums Substituted(const ConstMatrixRef& t, const ConstVectorRef& shift,
                            double variance = 1) const;
+  // Whether sums that were read from a snapshot have this number of terms and are finite.
+  bool IsValid(int terms) const;
+
   // Returns χ² = 2 J_mismatch at d.
   double ChiSquared(const ConstVectorRef& d) const;
   // Returns χ² at d; `gradient` (S) is with respect to d.

@@ -6,6 +6,7 @@
 #include <sstream>
 #include <utility>
 
+#include "core/common/finite_matrix.h"
 #include "core/estimator/state_archive.h"
 
 namespace polyest::internal {
@@ -181,10 +182,9 @@ void load(Archive& archive, EndedRuns& ended) {
   std::vector<double> spent;
   ArchiveFields(archive, ended, centre, axes, truncation, spent);
   const Eigen::Index n = centre.size();
-  if (n < 1 || n > kMaxParametersOfRuns || axes.rows() != n || axes.cols() != n ||
-      !centre.allFinite() || !axes.allFinite() || spent.size() != ended.sums.size() ||
-      truncation.order < 1 || truncation.order > kMaxTerms || !(truncation.exponent > 0) ||
-      truncation.exponent > 1 ||
+  if (n < 1 || n > kMaxParametersOfRuns || !IsFiniteMatrix(centre, n) ||
+      !IsFiniteMatrix(axes, n, n) || spent.size() != ended.sums.size() || truncation.order < 1 ||
+      truncation.order > kMaxTerms || !(truncation.exponent > 0) || truncation.exponent > 1 ||
       TermCount(static_cast<int>(n), truncation, kMaxTerms) > kMaxTerms) {
     throw cereal::Exception("ended runs that cannot be");
   }

@@ -5,6 +5,7 @@
 #include <optional>
 #include <utility>
 
+#include "core/common/finite_matrix.h"
 #include "core/common/infeasible.h"
 #include "core/common/linear_algebra.h"
 #include "core/common/status.h"
@@ -14,14 +15,6 @@
 
 namespace polyest::internal {
 namespace {
-
-bool IsVector(const Vector& vector, Eigen::Index size) {
-  return vector.size() == size && vector.allFinite();
-}
-
-bool IsMatrix(const Matrix& matrix, Eigen::Index rows, Eigen::Index columns) {
-  return matrix.rows() == rows && matrix.cols() == columns && matrix.allFinite();
-}
 
 // Whether an expansion of the problem can have this truncation: its first one or, for an automatic
 // order, a higher one, over the whole prior in many dimensions only (return_to_prior.h).
@@ -38,18 +31,20 @@ bool IsTruncationOf(const ResolvedProblem& problem, const Truncation& truncation
 
 bool IsElementIn(int dimension, const std::vector<Element::Bound>& bounds) {
   return std::ranges::all_of(bounds, [&](const Element::Bound& bound) {
-    return IsVector(bound.normal, dimension) && std::isfinite(bound.offset);
+    return IsFiniteMatrix(bound.normal, dimension) && std::isfinite(bound.offset);
   });
 }
 
 bool IsDesignFor(const ResolvedProblem& problem, const DesignState& state) {
   const int n = problem.dimension();
   const Eigen::Index checks = state.check_points.rows();
-  if (!IsTruncationOf(problem, state.truncation, state.whole_prior) || !IsVector(state.centre, n) ||
-      !IsMatrix(state.axes, n, n) || !IsMatrix(state.points, state.points.rows(), n) ||
-      state.points.rows() > kMaxPoints || !IsMatrix(state.check_points, checks, n) ||
-      checks > kMaxPoints || state.check_costs.size() != checks || !IsVector(state.reference, n) ||
-      !IsVector(state.lower, n) || !IsVector(state.upper, n) || !IsElementIn(n, state.element)) {
+  if (!IsTruncationOf(problem, state.truncation, state.whole_prior) ||
+      !IsFiniteMatrix(state.centre, n) || !IsFiniteMatrix(state.axes, n, n) ||
+      !IsFiniteMatrix(state.points, state.points.rows(), n) || state.points.rows() > kMaxPoints ||
+      !IsFiniteMatrix(state.check_points, checks, n) || checks > kMaxPoints ||
+      state.check_costs.size() != checks || !IsFiniteMatrix(state.reference, n) ||
+      !IsFiniteMatrix(state.lower, n) || !IsFiniteMatrix(state.upper, n) ||
+      !IsElementIn(n, state.element)) {
     return false;
   }
   return std::isfinite(LuFactors(state.axes).LogAbsDeterminant()) &&
@@ -70,15 +65,10 @@ bool IsNoiseOf(const ResolvedProblem& problem, const LearnedNoise& noise) {
     if (!(grid.shortest_s > 0 && std::isfinite(grid.longest_s))) return false;
   }
   const int n = problem.dimension();
-  if (noise.centre.size() > 0 && !IsVector(noise.centre, n)) return false;
+  if (noise.centre.size() > 0 && !IsFiniteMatrix(noise.centre, n)) return false;
   const PosteriorSummary& posterior = noise.posterior;
   return posterior.centre.size() == 0 ||
-         (IsVector(posterior.centre, n) && IsMatrix(posterior.factor, n, n));
-}
-
-bool AreSums(const MismatchSums& sums, int terms) {
-  return IsMatrix(sums.G(), terms, terms) && IsVector(sums.b(), terms) && std::isfinite(sums.w()) &&
-         sums.count() >= 0;
+         (IsFiniteMatrix(posterior.centre, n) && IsFiniteMatrix(posterior.factor, n, n));
 }
 
 // Samples that are kept may have been given up since the beginning, but not the other way.
@@ -103,7 +93,7 @@ bool AreOfFew(const std::optional<SampleBySample>& state,
          state->check_log_variance.cols() == fresh->check_log_variance.cols() &&
          state->point_log_variance.rows() == fresh->point_log_variance.rows() &&
          state->point_log_variance.cols() == fresh->point_log_variance.cols() &&
-         IsVector(state->largest, fresh->largest.size()) && state->own_error >= 0 &&
+         IsFiniteMatrix(state->largest, fresh->largest.size()) && state->own_error >= 0 &&
          std::isfinite(state->own_error);
 }
 
@@ -112,8 +102,8 @@ bool HasSizesOf(const AbsorbedRows& state, const AbsorbedRows& fresh, bool has_w
   const auto terms = static_cast<int>(fresh.previous_coefficients.rows());
   const auto channels = fresh.discount.size();
   for (const ChannelSums& sums : state.sums) {
-    if (!AreSums(sums.samples, terms) || !AreSums(sums.differences, terms)) return false;
-    if (!IsVector(sums.log_variance, fresh.sums.front().log_variance.size())) return false;
+    if (!sums.samples.IsValid(terms) || !sums.differences.IsValid(terms)) return false;
+    if (!IsFiniteMatrix(sums.log_variance, fresh.sums.front().log_variance.size())) return false;
     if (!std::isfinite(sums.log_variance_at_reference)) return false;
     if (!std::isfinite(sums.surplus)) return false;
   }
@@ -131,9 +121,10 @@ bool HasSizesOf(const AbsorbedRows& state, const AbsorbedRows& fresh, bool has_w
          state.windows.Suits(fresh.sums, has_windows ? state.rows : 0) &&
          std::ranges::equal(state.profiles, fresh.profiles, same) &&
          std::ranges::equal(state.blocks, fresh.blocks, alike) &&
-         IsVector(state.discount, channels) && std::ssize(state.outliers) == channels &&
-         IsMatrix(state.previous_coefficients, terms, channels) &&
-         IsVector(state.previous_error, channels) && IsVector(state.largest, channels) &&
+         IsFiniteMatrix(state.discount, channels) && std::ssize(state.outliers) == channels &&
+         IsFiniteMatrix(state.previous_coefficients, terms, channels) &&
+         IsFiniteMatrix(state.previous_error, channels) &&
+         IsFiniteMatrix(state.largest, channels) &&
          state.check_chi_squared.rows() == fresh.check_chi_squared.rows() &&
          state.check_chi_squared.cols() == channels &&
          state.check_residual.size() == fresh.check_residual.size() &&
@@ -141,7 +132,7 @@ bool HasSizesOf(const AbsorbedRows& state, const AbsorbedRows& fresh, bool has_w
          state.point_chi_squared.rows() == fresh.point_chi_squared.rows() &&
          state.point_chi_squared.cols() == channels &&
          state.point_log_variance.size() == fresh.point_log_variance.size() &&
-         IsMatrix(state.control_scores, terms, fresh.control_scores.cols()) &&
+         IsFiniteMatrix(state.control_scores, terms, fresh.control_scores.cols()) &&
          state.control_valid.size() == fresh.control_valid.size() && state.rows >= 0 &&
          state.samples >= 0 && state.propagated >= 0 && state.own_error >= 0 &&
          std::isfinite(state.own_error) && state.carried_error >= 0 &&

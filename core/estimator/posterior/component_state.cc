@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/common/check.h"
+#include "core/common/finite_matrix.h"
 #include "core/common/status.h"
 #include "core/estimator/posterior/mixture_component.h"
 
@@ -36,12 +37,10 @@ bool IsMemoryFor(const ResolvedProblem& problem, const ReexpansionMemory& memory
   }
   const OrderInVain& tried = memory.order;
   const auto n = static_cast<Eigen::Index>(problem.dimension());
-  return tried.order == 0 ||
-         (tried.order > 0 && tried.rows >= 0 && std::isfinite(tried.error) &&
-          tried.centre.size() == n && tried.centre.allFinite() && tried.axes.rows() == n &&
-          tried.axes.cols() == n && tried.axes.allFinite() &&
-          tried.noise_variance.size() == problem.channels() &&
-          (tried.noise_variance.array() > 0).all());
+  return tried.order == 0 || (tried.order > 0 && tried.rows >= 0 && std::isfinite(tried.error) &&
+                              IsFiniteMatrix(tried.centre, n) && IsFiniteMatrix(tried.axes, n, n) &&
+                              tried.noise_variance.size() == problem.channels() &&
+                              (tried.noise_variance.array() > 0).all());
 }
 
 bool IsStateFor(const ResolvedProblem& problem, const ComponentState& state) {

@@ -5,18 +5,10 @@
 #include <functional>
 
 #include "core/bayes/noise.h"
+#include "core/common/finite_matrix.h"
 
 namespace polyest::internal {
 namespace {
-
-bool IsFiniteMatrix(const Matrix& matrix, Eigen::Index rows, Eigen::Index columns) {
-  return matrix.rows() == rows && matrix.cols() == columns && matrix.allFinite();
-}
-
-bool AreSumsOf(const MismatchSums& sums, Eigen::Index terms) {
-  return IsFiniteMatrix(sums.G(), terms, terms) && IsFiniteMatrix(sums.b(), terms, 1) &&
-         std::isfinite(sums.w()) && sums.count() >= 0;
-}
 
 bool AreShapes(const std::vector<ScoreMixture>& shapes) {
   return std::ranges::all_of(shapes, [](const ScoreMixture& shape) {
@@ -87,27 +79,27 @@ Vector TermsAtCentre(const EndedRuns& ended) {
 
 bool IsWellFormed(const EndedRuns& ended, int shared, int own, int channels) {
   const auto runs = std::ssize(ended.run);
-  const Eigen::Index terms = ended.basis->size();
+  const int terms = ended.basis->size();
   if (ended.rows < 1 || ended.samples < 0 || runs < 1 || std::ssize(ended.first_row) != runs ||
       !AreAscending(ended.run) || ended.run.front() < 0 || !AreAscending(ended.first_row) ||
       ended.first_row.front() != 0 || ended.first_row.back() >= ended.rows) {
     return false;
   }
   for (const ChannelSums& sums : ended.sums) {
-    if (!AreSumsOf(sums.samples, terms) || !AreSumsOf(sums.differences, terms)) return false;
+    if (!sums.samples.IsValid(terms) || !sums.differences.IsValid(terms)) return false;
     if (!std::isfinite(sums.spent) || !std::isfinite(sums.surplus)) return false;
   }
   return ended.region.dimension() == shared && ended.basis->dimension() == shared &&
          IsFiniteMatrix(ended.paths, own * (1 + shared + own), runs) &&
-         IsFiniteMatrix(ended.centre, shared, 1) && IsFiniteMatrix(ended.factor, shared, shared) &&
+         IsFiniteMatrix(ended.centre, shared) && IsFiniteMatrix(ended.factor, shared, shared) &&
          std::ssize(ended.sums) == channels && std::ssize(ended.outliers) == channels &&
-         IsFiniteMatrix(ended.discount, channels, 1) &&
-         IsFiniteMatrix(ended.largest, channels, 1) && IsFiniteMatrix(ended.remainder, terms, 1) &&
-         IsFiniteMatrix(ended.noise_time_constant_s, channels, 1) &&
-         IsFiniteMatrix(ended.noise_white_share, channels, 1) &&
-         IsFiniteMatrix(ended.left_out, shared, 1) && AreShapes(ended.shapes) &&
+         IsFiniteMatrix(ended.discount, channels) && IsFiniteMatrix(ended.largest, channels) &&
+         IsFiniteMatrix(ended.remainder, terms) &&
+         IsFiniteMatrix(ended.noise_time_constant_s, channels) &&
+         IsFiniteMatrix(ended.noise_white_share, channels) &&
+         IsFiniteMatrix(ended.left_out, shared) && AreShapes(ended.shapes) &&
          (ended.shapes.empty() || std::ssize(ended.shapes) == runs) &&
-         std::isfinite(ended.unresolved) && IsFiniteMatrix(ended.noise_scale, channels, 1) &&
+         std::isfinite(ended.unresolved) && IsFiniteMatrix(ended.noise_scale, channels) &&
          ended.noise_scale.minCoeff() > 0 && std::isfinite(ended.own_error) &&
          std::isfinite(ended.log_noise) && std::isfinite(ended.log_variance);
 }

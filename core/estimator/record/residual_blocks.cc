@@ -1,5 +1,7 @@
 #include "core/estimator/record/residual_blocks.h"
 
+#include "core/common/finite_matrix.h"
+
 namespace polyest::internal {
 namespace {
 
@@ -8,10 +10,6 @@ double SquareAt(const Matrix& gram, const ConstVectorRef& delta) {
   Vector at(delta.size() + 1);
   at << -delta, 1;
   return at.dot(gram * at);
-}
-
-bool IsSquare(const Matrix& matrix, Eigen::Index size) {
-  return matrix.rows() == size && matrix.cols() == size && matrix.allFinite();
 }
 
 }  // namespace
@@ -53,9 +51,9 @@ double ResidualBlocks::MeanSquare(const ConstVectorRef& delta) const {
 
 bool ResidualBlocks::HasSizesOf(const ResidualBlocks& other) const {
   const Eigen::Index size = other.sum_.size();
-  return count_ >= 0 && in_block_ >= 0 && in_block_ < kLength && sum_.size() == size &&
-         sum_.allFinite() && IsSquare(block_, size) && IsSquare(samples_, size) &&
-         IsSquare(sums_, size);
+  return count_ >= 0 && in_block_ >= 0 && in_block_ < kLength && IsFiniteMatrix(sum_, size) &&
+         IsFiniteMatrix(block_, size, size) && IsFiniteMatrix(samples_, size, size) &&
+         IsFiniteMatrix(sums_, size, size);
 }
 
 }  // namespace polyest::internal
