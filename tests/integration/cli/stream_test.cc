@@ -234,32 +234,6 @@ TEST_F(StreamTest, ResumesWithAProblemFileThatNamesItsSchema) {
   }
 }
 
-TEST_F(StreamTest, EndsInOrderWhenInterrupted) {
-  std::vector<std::string> arguments = Command("-", {});
-  arguments.insert(arguments.begin(), POLYEST_PROGRAM);
-  Process process(arguments);
-  process.Write(DemoRows(60));
-  // The first estimate has come; the input stays open.
-  EXPECT_THAT(process.ReadLine(), StartsWith("t = 1.5 s"));
-  process.Signal(SIGINT);
-  EXPECT_THAT(process.ReadAll(), HasSubstr("samples up to t = "));
-  EXPECT_EQ(process.Wait(), 0) << process.Errors();
-}
-
-TEST_F(StreamTest, SaysWhatItHasSentOfAFileWhenInterrupted) {
-  const std::string data = File("d.csv", DemoRows(6000));
-  std::vector<std::string> arguments = Command(data, {"--rate", "1", "--batch", "2"});
-  arguments.insert(arguments.begin(), POLYEST_PROGRAM);
-  Process process(arguments);
-  EXPECT_THAT(process.ReadLine(), StartsWith("t = "));
-  process.Signal(SIGINT);
-  EXPECT_THAT(process.ReadAll(), HasSubstr("samples up to t = "));
-  EXPECT_EQ(process.Wait(), 1);
-  EXPECT_THAT(Lines(process.Errors()).back(),
-              AllOf(StartsWith("polyest: interrupted: the estimate is of the first "),
-                    EndsWith(" rows of " + data)));
-}
-
 TEST_F(StreamTest, KeepsTheRowsBeforeABadOneAndSaysWhichItIs) {
   const Finished run = Run(Command("-", {"--session", "rig-1", "--format", "jsonl"}),
                            DemoRows(35) + "1,2,3\n" + "1.8,0\n");
@@ -362,21 +336,6 @@ TEST_F(StreamTest, HoldsOutWhileTheDiskIsFullAndGoesOnWhenThereIsRoom) {
   const Finished undisturbed =
       Run(Command("-", {"--batch", "30", "--format", "jsonl"}), DemoRows(90));
   EXPECT_EQ(estimates.back(), Lines(undisturbed.out).back());
-}
-
-TEST_F(StreamTest, WaitsForRoomForItsSessionUntilItIsInterrupted) {
-  DaemonProcess daemon({"--max-memory-mb", "1"});
-  Process process(
-      {POLYEST_PROGRAM, "stream", Example("oscillator.json"), "-", "--server", daemon.address()});
-  process.Write(DemoRows(30));
-  Client client(daemon.address());
-  while (process.Errors().find("cannot create a session now") == std::string::npos) {
-    ASSERT_TRUE(client.GetStatus({}).ok());
-  }
-  process.Signal(SIGINT);
-  EXPECT_EQ(process.Wait(), 1);
-  EXPECT_THAT(process.Errors(), HasSubstr("(--max-memory-mb)"));
-  EXPECT_EQ(Lines(process.Errors()).back(), "polyest: interrupted before the first estimate");
 }
 
 TEST_F(StreamTest, GivesUpAtALimitThatWaitingDoesNotCure) {
