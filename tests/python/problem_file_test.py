@@ -23,10 +23,11 @@ NOT_JSON = [
     b'{"fixed": {"m": 1}, "fixed": {"m": 2}}', b'{"fixed": {"m": 1,\n "m": 2}}',
     b'{"uncertain": [{}, {"uniform": {"lower": 1, "lower": 1, "upper": 2}}]}',
     b'{"fixed": {"m": 1, "m": 2}, "fixed": {}}', b'{"measured": [null]}',
-    b'\xef\xbb\xbf\n{"fixed" 1}',
+    b'\xef\xbb\xbf\n{"fixed" 1}', b'{"fixed": {"m": 1, "\\u006d": 2}}',
 ]
 NO_PROBLEM = [
-    b"", b" \n", b"[]", b'{"modle": {}}', b'{"modle": {}, "uncertain": [{"unifrom": {}}]}',
+    b"", b" \n", b"[]", b"t,x\n0,1\n", b"t\n0\n", b"model: a, b\n",
+    b'{"uncertain": [{"name": "k", "normal": {"mean": 1, "stdDev": 1, "std_dev": 2}}]}', b'{"modle": {}}', b'{"modle": {}, "uncertain": [{"unifrom": {}}]}',
     b'{"uncertain": [{"name": "k", "uniform": {"upper": 47.4}}]}',
     b'{"uncertain": [{"name": "k", "uniform": {"lower": -1}}]}',
     b'{"uncertain": [{"name": "k", "uniform": {}}]}',

@@ -131,10 +131,13 @@ class Search {
     // A protobuf map has no order; std::map gives the fields one.
     const std::map<std::string, Value> fields(object.fields().begin(), object.fields().end());
     std::map<const OneofDescriptor*, std::string> given;
+    std::map<const FieldDescriptor*, std::string> names;
     for (const auto& [name, value] : fields) {
       const FieldDescriptor* const field = FindField(message, name);
       // CheckJsonStructure refuses a null where it does not stand for a field that is not given.
       if (field == nullptr || value.has_null_value()) continue;
+      const auto [same, is_new] = names.emplace(field, name);
+      if (!is_new) return RefuseNames(same->second, name, prefix);
       if (const OneofDescriptor* const choice = field->real_containing_oneof()) {
         const auto [first, is_first] = given.emplace(choice, name);
         if (!is_first) return RefuseBoth(*choice, first->second, name, prefix);
@@ -149,6 +152,12 @@ class Search {
  private:
   void Refuse(const std::string& path, const Value& value, absl::string_view rule) {
     wrong_ = absl::StrCat(path, ": ", Shown(value), " must be ", rule);
+  }
+
+  // Refuses a field under two names; protobuf keeps the value of the last one.
+  void RefuseNames(const std::string& first, const std::string& second, const std::string& path) {
+    wrong_ = absl::StrCat(path, path.empty() ? "" : ": ", first, " and ", second,
+                          " are both given, which is one field");
   }
 
   void RefuseBoth(const OneofDescriptor& choice, const std::string& first,

@@ -125,6 +125,12 @@ TEST(ParseProblem, NamesTheWordsThatAFieldTakes) {
             "problem.json: expansion.pointsPerTerm: \"two\" must be a number");
 }
 
+TEST(ParseProblem, RefusesAFieldUnderBothOfItsNames) {
+  EXPECT_EQ(ErrorOf(R"({"uncertain": [{"normal": {"mean": 1, "stdDev": 1, "std_dev": 2}}]})"),
+            "problem.json: uncertain[0].normal: stdDev and std_dev are both given, which is one "
+            "field");
+}
+
 TEST(ParseProblem, RefusesASecondPrior) {
   EXPECT_THAT(ErrorOf(R"({"uncertain": [{"uniform": {}, "normal": {}}]})"),
               StartsWith("problem.json: uncertain[0]: normal and uniform are both given; only one "

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 from collections.abc import Mapping
 from typing import Any, Union
 
@@ -31,11 +32,15 @@ def read(path: Union[str, os.PathLike[str]]) -> dict[str, Any]:
     except (OSError, ValueError) as error:
         why = getattr(error, "strerror", None) or error
         raise InvalidInput(f"{name}: cannot be opened: {why}".replace("\0", "\\0")) from error
-    if not data.removeprefix(b"\xef\xbb\xbf").strip():
+    text = data.removeprefix(b"\xef\xbb\xbf").strip()
+    if not text:
         raise InvalidInput(f"{name}: is empty; it must hold one JSON object, the problem")
     try:
         document = _strict_json.loads(data)
     except _strict_json.JsonError as error:
+        first_line = text.partition(b"\n")[0].strip()
+        if text[:1] not in b"{[" and (first_line == b"t" or re.search(b"[,;\t]", first_line)):
+            raise InvalidInput(f"{name}: is CSV data; a problem is one JSON object") from None
         raise InvalidInput(f"{name}{error.place}: {error}", field=error.field,
                            rule=error.rule) from None
     if not isinstance(document, dict):

@@ -37,7 +37,8 @@ def parse(document: Mapping[str, Any], message: Message, place: str = "",
         wrong_value = _refusal(str(failure))
     if wrong_value is not None:
         field, rule = wrong_value
-        raise InvalidInput(f"{place}{field}: {rule}", field=field, rule=rule) from failure
+        sentence = f"{field}: {rule}" if field else rule
+        raise InvalidInput(place + sentence, field=field, rule=rule) from failure
 
 
 def _refuse_unknown(document: Mapping[str, Any], message: Message, place: str,

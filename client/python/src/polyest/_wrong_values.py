@@ -25,16 +25,20 @@ def find(document: Mapping[str, Any], message: Descriptor,
     Fields that the message lacks are passed over.
     """
     given: dict[str, str] = {}
+    names: dict[str, str] = {}
     for name, value in sorted(document.items()):
         field = field_named(message, name)
         if field is None or (value is None and _may_be_null(field)):
             continue
+        same = names.setdefault(field.name, name)
+        if same != name:
+            return prefix, f"{same} and {name} are both given, which is one field"
         choice = field.containing_oneof
         if choice is not None and len(choice.fields) > 1:
             first = given.setdefault(choice.name, name)
             if first != name:
-                names = ", ".join(_name(one) for one in choice.fields)
-                return prefix, f"{first} and {name} are both given; only one of {names} may be"
+                those = ", ".join(_name(one) for one in choice.fields)
+                return prefix, f"{first} and {name} are both given; only one of {those} may be"
         found = _field(value, field, f"{prefix}.{name}" if prefix else name)
         if found is not None:
             return found

@@ -118,6 +118,7 @@ TEST(JsonStructure, FindsAFieldThatIsGivenTwiceInOneObject) {
   EXPECT_EQ(ErrorOf("{\"a\": 1,\n\"b\": 2,\n\"a\": 3}"), "3:1: a: given twice");
   EXPECT_EQ(ErrorOf(R"({"c": [1, {"d": {"e": "a", "f": "a", "e": 2}}]})"),
             "1:38: c[1].d.e: given twice");
+  EXPECT_EQ(ErrorOf(R"({"\u0061": 1, "\\u0061": 2, "\/": 3, "/b": 4, "\"": 5, "\u00e4": 6})"), "");
   EXPECT_EQ(ErrorOf(R"({"a:b": 1, "a": ":a", "b": "a:"})"), "");
   EXPECT_EQ(ErrorOf(R"({"a": 1, "\u0061": 2})"), "1:10: a: given twice");
 }
