@@ -1,6 +1,7 @@
 #include "server/web/transcode.h"
 
 #include <absl/strings/ascii.h>
+#include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_split.h>
 #include <google/protobuf/message.h>
@@ -91,6 +92,9 @@ rpc::Status FromJsonText(const std::string& json, const google::protobuf::Descri
                          std::string& bytes) {
   if (absl::StripAsciiWhitespace(json).empty()) return {};
   if (const auto error = CheckJsonStructure(json, type)) return InBody(*error);
+  if (!absl::StartsWith(absl::StripLeadingAsciiWhitespace(json), "{")) {
+    return Invalid("the body must hold one JSON object");
+  }
   google::protobuf::util::JsonParseOptions options;
   options.ignore_unknown_fields = false;
   const auto read = google::protobuf::util::JsonToBinaryString(

@@ -107,6 +107,11 @@ TEST(Transcode, RefusesValuesOfTheWrongTypeAndTextThatIsNoObject) {
   }
 }
 
+TEST(Transcode, NamesTheBodyThatIsNoObject) {
+  EXPECT_EQ(Read<v1::GetSessionRequest>(" [1]").message(), "the body must hold one JSON object");
+  EXPECT_EQ(Read<v1::GetSessionRequest>("null").message(), "the body must hold one JSON object");
+}
+
 TEST(Transcode, RefusesDeepNestingAtOnce) {
   const std::string deep(100'000, '[');
   const rpc::Status status =
