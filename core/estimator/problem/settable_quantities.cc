@@ -132,28 +132,29 @@ std::string SettableQuantities::Describe() const {
 }
 
 void SettableQuantities::Fill(const Matrix& values, EnsembleSpecification& ensemble) const {
-  const auto of_inputs = [&](int which) {
+  const auto of_inputs = [&](Kind kind) {
     Matrix columns(values.rows(), inputs_);
-    for (int i = 0; i < inputs_; ++i) columns.col(i) = values.col(Amplitude(i) + which);
+    for (int i = 0; i < inputs_; ++i) columns.col(i) = values.col(OfInput(kind, i));
     return columns;
   };
   // The model's own outputs have channels; those that show what drifts are read as they are.
-  const auto of_outputs = [&](int which, double neutral) {
+  const auto of_outputs = [&](Kind kind, double neutral) {
     Matrix columns = Matrix::Constant(values.rows(), std::ssize(ensemble.outputs), neutral);
     for (Eigen::Index c = 0; c < columns.cols(); ++c) {
       const int output = ensemble.outputs[static_cast<size_t>(c)];
-      if (output < outputs_) columns.col(c) = values.col(Amplitude(inputs_) + 3 * output + which);
+      if (output < outputs_) columns.col(c) = values.col(OfOutput(kind, output));
     }
     return UnlessNeutral(columns, neutral);
   };
   ensemble.parameters = values.leftCols(parameters_);
-  ensemble.amplitudes = of_inputs(0).cwiseProduct(of_inputs(1));
-  ensemble.input_delays_s = UnlessNeutral(of_inputs(2), 0);
-  ensemble.input_offsets = UnlessNeutral(of_inputs(3), 0);
-  ensemble.output_gains = of_outputs(0, 1);
-  ensemble.output_delays_s = of_outputs(1, 0);
-  ensemble.output_offsets = of_outputs(2, 0);
-  for (int i = OutputDelay(outputs_) - 1; i < size(); ++i) {
+  ensemble.amplitudes = of_inputs(Kind::kAmplitude).cwiseProduct(of_inputs(Kind::kInputGain));
+  ensemble.input_delays_s = UnlessNeutral(of_inputs(Kind::kDelay), 0);
+  ensemble.input_offsets = UnlessNeutral(of_inputs(Kind::kInputOffset), 0);
+  ensemble.output_gains = of_outputs(Kind::kOutputGain, 1);
+  ensemble.output_delays_s = of_outputs(Kind::kOutputDelay, 0);
+  ensemble.output_offsets = of_outputs(Kind::kOutputOffset, 0);
+  // What only filters use follows the quantities of the outputs.
+  for (int i = OfOutput(Kind::kOutputGain, outputs_); i < size(); ++i) {
     const Settable& settable = (*this)[i];
     if (settable.kind == Kind::kNoise) {
       SetNoise(settable, values.col(i), ensemble);

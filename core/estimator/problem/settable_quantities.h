@@ -28,6 +28,8 @@ std::string NoiseName(const std::string& output);
 
 class SettableQuantities {
  public:
+  // The kinds of each input, and those of each output, are in the order that they have in the
+  // vector.
   enum class Kind {
     kParameter,
     kAmplitude,
@@ -74,9 +76,7 @@ class SettableQuantities {
   // Returns the default values, in the order of the quantities.
   Vector Defaults() const;
   // Returns the index of the amplitude of the model's input `column`.
-  int Amplitude(int column) const { return parameters_ + 4 * column; }
-  // Returns the index of the delay of the model's output `column`.
-  int OutputDelay(int column) const { return Amplitude(inputs_) + 3 * column + 1; }
+  int Amplitude(int column) const { return OfInput(Kind::kAmplitude, column); }
   // Returns a list of all names, for a message.
   std::string Describe() const;
 
@@ -85,6 +85,20 @@ class SettableQuantities {
   void Fill(const Matrix& values, EnsembleSpecification& ensemble) const;
 
  private:
+  static constexpr int kKindsOfInput = 4;   // amplitude, gain, delay and offset
+  static constexpr int kKindsOfOutput = 3;  // gain, delay and offset
+
+  // Return the index of a quantity of the model's input or output `column`. The column after the
+  // last one gives the index at which those of all inputs or outputs end.
+  int OfInput(Kind kind, int column) const {
+    return parameters_ + kKindsOfInput * column + Distance(Kind::kAmplitude, kind);
+  }
+  int OfOutput(Kind kind, int column) const {
+    return OfInput(Kind::kAmplitude, inputs_) + kKindsOfOutput * column +
+           Distance(Kind::kOutputGain, kind);
+  }
+  static int Distance(Kind from, Kind to) { return static_cast<int>(to) - static_cast<int>(from); }
+
   // Adds the parameters, and what is settable of each input and output.
   void AddQuantitiesOfModel(const ModelDescription& model);
   // Adds spectral densities, rates of drifts and, with filters, the noise of sensors.
