@@ -117,12 +117,12 @@ void serialize(Archive& archive, SampleBySample& few) {
 
 template <class Archive>
 void serialize(Archive& archive, AbsorbedRows& absorbed) {
-  archive(absorbed.rows, absorbed.samples, absorbed.propagated, absorbed.sums, absorbed.discount,
-          absorbed.own_error, absorbed.log_noise, absorbed.log_variance, absorbed.outliers,
-          absorbed.summed_run, absorbed.previous_coefficients, absorbed.previous_error,
-          absorbed.check_chi_squared, absorbed.check_residual, absorbed.check_valid,
-          absorbed.point_chi_squared, absorbed.windows, absorbed.profiles, absorbed.blocks,
-          absorbed.largest, absorbed.control_scores, absorbed.control_valid,
+  archive(absorbed.rows, absorbed.sample_count, absorbed.propagated, absorbed.sums,
+          absorbed.discount, absorbed.own_error, absorbed.log_noise, absorbed.log_variance,
+          absorbed.outliers, absorbed.summed_run, absorbed.previous_coefficients,
+          absorbed.previous_error, absorbed.check_chi_squared, absorbed.check_residual,
+          absorbed.check_valid, absorbed.point_chi_squared, absorbed.windows, absorbed.profiles,
+          absorbed.blocks, absorbed.largest, absorbed.control_scores, absorbed.control_valid,
           absorbed.point_log_variance, absorbed.carried_error, absorbed.carried_rate, absorbed.few,
           absorbed.densities);
 }
@@ -157,7 +157,7 @@ void serialize(Archive& archive, ScoreMixture& shape) {
 template <class Archive, class Ended>
 void ArchiveFields(Archive& archive, Ended& ended, Vector& centre, Matrix& axes,
                    Truncation& truncation, std::vector<double>& spent) {
-  archive(ended.rows, ended.samples, ended.run, ended.first_row, ended.paths, ended.centre,
+  archive(ended.rows, ended.sample_count, ended.run, ended.first_row, ended.paths, ended.centre,
           ended.factor, centre, axes, truncation.order, truncation.exponent, ended.sums, spent,
           ended.discount, ended.own_error, ended.log_noise, ended.log_variance, ended.outliers,
           ended.largest, ended.remainder, ended.noise_scale, ended.noise_time_constant_s,

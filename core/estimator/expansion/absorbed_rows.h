@@ -65,7 +65,7 @@ struct AbsorbedRows {
   Matrix CheckChiSquared() const;
 
   int64_t rows = 0;
-  int64_t samples = 0;            // over all channels
+  int64_t sample_count = 0;       // over all channels
   int64_t propagated = 0;         // trajectories × rows
   std::vector<ChannelSums> sums;  // per channel, over all runs
   WindowSums windows;             // the sums by windows of the record; none after ended runs

@@ -28,21 +28,21 @@ class Substitution {
 
   // Finds T, δ and the terms at the new points. Fails if a collocation matrix cannot be factored.
   absl::Status Prepare(const ExpansionDesign& design) {
-    first_check_ = design.points.rows();
+    points_ = design.points.rows();
     POLYEST_ASSIGN_OR_RETURN(CollocationMatrix after,
                              CollocationMatrix::Factor(*design.basis, design.points, stop_));
-    Matrix points(design.points.rows() + design.check_points.rows(), design.points.cols());
-    points << design.points, design.check_points;
-    before_.basis->EvaluateMany(before_.region.ManyToLocal(design.region.ManyToGerm(points)), phi_);
+    Matrix etas(design.points.rows() + design.check_points.rows(), design.points.cols());
+    etas << design.points, design.check_points;
+    before_.basis->EvaluateMany(before_.region.ManyToLocal(design.region.ManyToGerm(etas)), phi_);
     const Eigen::Index old_terms = phi_.cols();
     transfer_.resize(design.basis->size(), old_terms);
     Vector residual(old_terms);
-    after.Solve(phi_.topRows(design.points.rows()), transfer_, residual);
+    after.Solve(phi_.topRows(points_), transfer_, residual);
     Vector reference(old_terms), new_reference(transfer_.rows());
     before_.basis->Evaluate(before_.reference, reference);
     design.basis->Evaluate(design.reference, new_reference);
     shift_ = transfer_.transpose() * new_reference - reference;
-    design.basis->EvaluateMany(points, new_phi_);
+    design.basis->EvaluateMany(etas, new_phi_);
     new_reference_ = new_reference;
     new_phi_.rowwise() -= new_reference.transpose();
     return absl::OkStatus();
@@ -63,7 +63,9 @@ class Substitution {
   Eigen::Index old_controls() const {
     return kept_.absorbed.control_scores.cols() / std::max<Eigen::Index>(1, channels());
   }
-  Eigen::Index old_points() const { return before_.points.rows() + before_.check_points.rows(); }
+  Eigen::Index first_old_control() const {
+    return before_.points.rows() + before_.check_points.rows();
+  }
 
   AbsorbedRows Absorbed(const ExpansionDesign& design, double error) const {
     const AbsorbedRows& old = kept_.absorbed;
@@ -73,12 +75,12 @@ class Substitution {
     for (ResidualBlocks& blocks : absorbed.blocks) blocks = blocks.Renewed();
     absorbed.previous_coefficients = transfer_ * old.previous_coefficients;
     absorbed.previous_error -= old.previous_coefficients.transpose() * shift_;
-    const Eigen::Index points = design.points.rows(), checks = design.check_points.rows();
+    const Eigen::Index checks = design.check_points.rows();
     absorbed.check_residual.setConstant(checks, error);
     absorbed.check_valid.assign(static_cast<size_t>(checks), true);
     absorbed.check_chi_squared.resize(checks, channels());
-    absorbed.point_chi_squared.resize(points, channels());
-    if (problem_.uses_filters()) absorbed.point_log_variance.setZero(points);
+    absorbed.point_chi_squared.resize(points_, channels());
+    if (problem_.uses_filters()) absorbed.point_log_variance.setZero(points_);
     for (Eigen::Index c = 0; c < channels(); ++c) {
       ChannelSums& sums = absorbed.sums[static_cast<size_t>(c)];
       sums.samples = sums.samples.Substituted(transfer_, shift_);
@@ -89,19 +91,19 @@ class Substitution {
       }
       if (problem_.uses_filters()) {
         const Vector log_variances = SubstituteLogVariances(sums);
-        absorbed.point_log_variance += log_variances.head(points);
+        absorbed.point_log_variance += log_variances.head(points_);
         chi_squared += 2 * log_variances;
       }
-      absorbed.point_chi_squared.col(c) = chi_squared.head(points);
+      absorbed.point_chi_squared.col(c) = chi_squared.head(points_);
       absorbed.check_chi_squared.col(c) = chi_squared.tail(checks);
     }
     SetControlScores(absorbed);
-    if (absorbed.few) Carry(absorbed, points, error);
+    if (absorbed.few) Carry(absorbed, error);
     return absorbed;
   }
 
   // Carries the samples over that are kept by themselves. Other channels are as in the sums.
-  void Carry(AbsorbedRows& absorbed, Eigen::Index points, double error) const {
+  void Carry(AbsorbedRows& absorbed, double error) const {
     SampleBySample& few = *absorbed.few;
     few.own_error = error;
     few.check_residual = absorbed.check_residual;
@@ -109,32 +111,32 @@ class Substitution {
     few.check_chi_squared = absorbed.check_chi_squared;
     Matrix product;
     for (Eigen::Index c = 0; c < channels(); ++c) {
-      CarryRelative(c, points, few);
+      CarryRelative(c, few);
       RobustSamples& samples = few.channels[static_cast<size_t>(c)];
       samples = samples.Substituted(transfer_, shift_);
       if (samples.outliers() == OutlierHandling::kNone) continue;
       Vector losses = Vector::Zero(new_phi_.rows());
       samples.AddTo(losses, new_phi_, product);
-      few.point_chi_squared.col(c) = 2 * losses.head(points);
-      few.check_chi_squared.col(c) = 2 * losses.tail(losses.size() - points);
+      few.point_chi_squared.col(c) = 2 * losses.head(points_);
+      few.check_chi_squared.col(c) = 2 * losses.tail(losses.size() - points_);
     }
   }
 
-  void CarryRelative(Eigen::Index c, Eigen::Index points, SampleBySample& few) const {
+  void CarryRelative(Eigen::Index c, SampleBySample& few) const {
     RelativeSamples& samples = few.relative[static_cast<size_t>(c)];
     samples = samples.Substituted(transfer_, shift_);
     if (c == 0) {
-      few.point_log_variance.setZero(points, channels());
-      few.check_log_variance.setZero(new_phi_.rows() - points, channels());
+      few.point_log_variance.setZero(points_, channels());
+      few.check_log_variance.setZero(new_phi_.rows() - points_, channels());
     }
     if (!samples.keeps()) return;
     Matrix product;
     Vector chi_squared(new_phi_.rows()), log_variance(new_phi_.rows());
     samples.EvaluateMany(new_phi_, product, chi_squared, log_variance);
-    few.point_chi_squared.col(c) = chi_squared.head(points);
-    few.check_chi_squared.col(c) = chi_squared.tail(chi_squared.size() - points);
-    few.point_log_variance.col(c) = log_variance.head(points);
-    few.check_log_variance.col(c) = log_variance.tail(log_variance.size() - points);
+    few.point_chi_squared.col(c) = chi_squared.head(points_);
+    few.check_chi_squared.col(c) = chi_squared.tail(chi_squared.size() - points_);
+    few.point_log_variance.col(c) = log_variance.head(points_);
+    few.check_log_variance.col(c) = log_variance.tail(log_variance.size() - points_);
   }
 
   // Replaces the terms of ½ Σ log(S/σ²) = lᵀφ by l′ = T l and returns its values at the new points.
@@ -160,16 +162,16 @@ class Substitution {
   // at the new points. Below them, the new control trajectories differ from their check points as
   // the old ones did. `fit` is the collocation matrix of the old points.
   Matrix AtNewPoints(const Matrix& values, CollocationMatrix& fit) const {
-    const Eigen::Index points = before_.points.rows();
+    const Eigen::Index first_check = before_.points.rows();
     Matrix coefficients(phi_.cols(), values.cols());
     Vector residual(values.cols());
-    fit.Solve(values.topRows(points), coefficients, residual);
+    fit.Solve(values.topRows(first_check), coefficients, residual);
     Matrix moved(phi_.rows() + controls_, values.cols());
     moved.topRows(phi_.rows()) = phi_ * coefficients;
     for (Eigen::Index i = 0; i < controls_; ++i) {
       const Eigen::Index old = i % old_controls();
-      moved.row(phi_.rows() + i) =
-          moved.row(first_check_ + i) + values.row(old_points() + old) - values.row(points + old);
+      moved.row(phi_.rows() + i) = moved.row(points_ + i) + values.row(first_old_control() + old) -
+                                   values.row(first_check + old);
     }
     return moved;
   }
@@ -177,7 +179,7 @@ class Substitution {
   absl::StatusOr<TrajectoryState> Trajectories() const {
     const TrajectoryState& before = kept_.trajectories;
     TrajectoryState state;
-    for (int q = 0; q < static_cast<int>(first_check_); ++q) state.kept.push_back(q);
+    for (int q = 0; q < static_cast<int>(points_); ++q) state.kept.push_back(q);
     state.run = before.run;
     POLYEST_ASSIGN_OR_RETURN(CollocationMatrix fit,
                              CollocationMatrix::Factor(*before_.basis, before_.points, stop_));
@@ -187,7 +189,7 @@ class Substitution {
     }
     if (!before.ensemble) return state;
     const Matrix own = InterpolableStates(problem_, *before.ensemble);
-    Matrix states(old_points() + old_controls(), own.cols());
+    Matrix states(first_old_control() + old_controls(), own.cols());
     states.topRows(own.rows()) = own;
     if (before.controls) {
       states.bottomRows(old_controls()) = InterpolableStates(problem_, *before.controls);
@@ -206,10 +208,10 @@ class Substitution {
   const ExpansionDesign& before_;
   Eigen::Index controls_;
   const Stop& stop_;
-  Eigen::Index first_check_ = 0;  // its row among the new points
-  Matrix transfer_;               // T, S′ × S
-  Vector shift_;                  // δ, S
-  Vector new_reference_;          // φ′_0, S′
+  Eigen::Index points_ = 0;  // Q′ new collocation points, which the check points follow
+  Matrix transfer_;          // T, S′ × S
+  Vector shift_;             // δ, S
+  Vector new_reference_;     // φ′_0, S′
   Matrix phi_, new_phi_;  // φ and φ′ − φ′_0 at the new points, (Q′ + C′) × S and × S′
 };
 

@@ -111,7 +111,7 @@ absl::StatusOr<Inherited> Judge(const ResolvedProblem& problem, const RegionalEx
   inherited.propagated = pairs.propagated;
   inherited.rate =
       kept.absorbed.carried_rate + pairs.mean_square * GrowthIn(design, present.design());
-  const double to_come = kRoomToGrow * static_cast<double>(present.absorbed().samples);
+  const double to_come = kRoomToGrow * static_cast<double>(present.absorbed().sample_count);
   if (!(inherited.error + inherited.rate * to_come <= max_error)) {
     return Refused("the states are not accurate enough");
   }

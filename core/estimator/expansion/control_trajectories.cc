@@ -79,10 +79,10 @@ void RegionalExpansion::Compare(const WeightedSample& sample) {
 }
 
 RegionalExpansion::Check RegionalExpansion::Checks() const {
-  const double samples = std::max<double>(1, static_cast<double>(absorbed_.samples));
+  const double samples = std::max<double>(1, static_cast<double>(absorbed_.sample_count));
   const Vector& residual = absorbed_.few ? absorbed_.few->check_residual : absorbed_.check_residual;
   return {absorbed_.CheckChiSquared(), (residual / samples).cwiseSqrt(), absorbed_.check_valid,
-          absorbed_.samples};
+          absorbed_.sample_count};
 }
 
 // Adds c_k δ_k/R_k of one sample.

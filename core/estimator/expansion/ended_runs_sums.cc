@@ -22,7 +22,7 @@ Matrix TermsAt(const EndedRuns& ended, const Region& region, const std::vector<i
 // Adds what counts along with the sums; `ratio` is that of the noise's variances, now to then.
 void AddCounts(const EndedRuns& ended, const Vector& ratio, AbsorbedRows& absorbed) {
   absorbed.rows = ended.rows;
-  absorbed.samples = ended.samples;
+  absorbed.sample_count = ended.sample_count;
   absorbed.discount = ended.discount;
   absorbed.own_error = ended.own_error;
   absorbed.log_noise = ended.log_noise;
@@ -88,7 +88,7 @@ void RegionalExpansion::TakeEndedRuns() {
 }
 
 void RegionalExpansion::AddCountsTo(EndedRuns& ended) const {
-  ended.samples += absorbed_.samples;
+  ended.sample_count += absorbed_.sample_count;
   ended.discount += absorbed_.discount;
   ended.own_error += absorbed_.own_error;
   ended.log_noise += absorbed_.log_noise;

@@ -134,7 +134,7 @@ bool HasSizesOf(const AbsorbedRows& state, const AbsorbedRows& fresh, bool has_w
          state.point_log_variance.size() == fresh.point_log_variance.size() &&
          IsFiniteMatrix(state.control_scores, terms, fresh.control_scores.cols()) &&
          state.control_valid.size() == fresh.control_valid.size() && state.rows >= 0 &&
-         state.samples >= 0 && state.propagated >= 0 && state.own_error >= 0 &&
+         state.sample_count >= 0 && state.propagated >= 0 && state.own_error >= 0 &&
          std::isfinite(state.own_error) && state.carried_error >= 0 &&
          std::isfinite(state.carried_error) && state.carried_rate >= 0 &&
          std::isfinite(state.carried_rate) && AreOfFew(state.few, fresh.few, terms);

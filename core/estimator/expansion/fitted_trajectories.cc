@@ -24,11 +24,11 @@ constexpr int kMoreSteps = 10;
 Matrix ParametersOf(const ResolvedProblem& problem, const ExpansionDesign& design) {
   Matrix etas(design.points.rows() + design.check_points.rows(), design.points.cols());
   etas << design.points, design.check_points;
-  Matrix points = design.region.ManyToGerm(etas);
-  for (Eigen::Index i = 0; i < points.rows(); ++i) {
-    points.row(i) = problem.prior().ToParameters(points.row(i).transpose()).transpose();
+  Matrix thetas = design.region.ManyToGerm(etas);
+  for (Eigen::Index i = 0; i < thetas.rows(); ++i) {
+    thetas.row(i) = problem.prior().ToParameters(thetas.row(i).transpose()).transpose();
   }
-  return points;
+  return thetas;
 }
 
 Matrix BasisAtCheckPoints(const ExpansionDesign& design) {

@@ -198,7 +198,7 @@ void RegionalExpansion::AbsorbSample(const WeightedSample& sample) {
   const auto outputs = block_.outputs.col(sample.column).head(points()).array();
   absorbed_.point_chi_squared.col(sample.channel).array() +=
       (outputs - sample.value).square() / variance;
-  ++absorbed_.samples;
+  ++absorbed_.sample_count;
 }
 
 // Adds what of the variance is the expansion's own error.

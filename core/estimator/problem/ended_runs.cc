@@ -80,7 +80,7 @@ Vector TermsAtCentre(const EndedRuns& ended) {
 bool IsWellFormed(const EndedRuns& ended, int shared, int own, int channels) {
   const auto runs = std::ssize(ended.run);
   const int terms = ended.basis->size();
-  if (ended.rows < 1 || ended.samples < 0 || runs < 1 || std::ssize(ended.first_row) != runs ||
+  if (ended.rows < 1 || ended.sample_count < 0 || runs < 1 || std::ssize(ended.first_row) != runs ||
       !AreAscending(ended.run) || ended.run.front() < 0 || !AreAscending(ended.first_row) ||
       ended.first_row.front() != 0 || ended.first_row.back() >= ended.rows) {
     return false;

@@ -52,8 +52,8 @@ struct RunPath {
 struct EndedRuns {
   // The rows of the record that belong to ended runs: the first `rows`.
   int64_t rows = 0;
-  int64_t samples = 0;   // over all channels
-  std::vector<int> run;  // the runs, ascending
+  int64_t sample_count = 0;  // over all channels
+  std::vector<int> run;      // the runs, ascending
   std::vector<int64_t> first_row;
   Matrix paths;  // a column for each run, see Path
 
