@@ -46,6 +46,29 @@ constexpr int kMaxMisfitRevisions = 12;
 // Factor by which the misfit falls while the cost's minimum lies beyond the region.
 constexpr double kMisfitStep = 4;
 
+// Returns the shift that the control trajectories show; 0 without any. They are compared with the
+// noise as stated, since errors of integration may be what the misfit consists of.
+double ShiftOfControls(const RegionalExpansion& expansion, double regularization) {
+  if (expansion.controls() == 0) return 0;
+  Cost cost = expansion.MakeCost(regularization);
+  cost.set_power(1);
+  return IntegrationShift(expansion, cost);
+}
+
+// Returns the tolerance that the noise asks for, the present one if that is enough.
+double ToleranceForNoise(double present, double noise_to_signal, int64_t count) {
+  const double samples = std::max(kMinSamplesCounted, static_cast<double>(count));
+  const double needed = kTolerancePerNoise * noise_to_signal / std::sqrt(samples);
+  // Half of the needed tolerance is taken, so that a slowly falling ratio does not cause frequent
+  // replays: four times as many samples come before the next.
+  return needed < present ? 0.5 * needed : present;
+}
+
+// Returns the tolerance that a shift of the controls asks for, the present one if it is small.
+double ToleranceForControls(double present, double shift) {
+  return shift > kMaxIntegrationShift ? present * kAimedIntegrationShift / shift : present;
+}
+
 }  // namespace
 
 // The residual of the expansion from which on it is too coarse, in units of the stated noise.
@@ -207,35 +230,16 @@ absl::StatusOr<std::unique_ptr<RegionalExpansion>> MixtureComponent::WithNewTole
   return ReplayedWith(noise, stop);
 }
 
-// Returns the shift that the control trajectories show; 0 without any. They are compared with the
-// noise as stated, since errors of integration may be what the misfit consists of.
-double MixtureComponent::ShiftOfControls() const {
-  if (expansion_->controls() == 0) return 0;
-  Cost cost = expansion_->MakeCost(problem_.problem().regularization);
-  cost.set_power(1);
-  return IntegrationShift(*expansion_, cost);
-}
-
-// Returns the tolerance that a shift of the controls asks for, the present one if it is small.
-double MixtureComponent::ToleranceForControls(double shift) const {
-  const double present = problem_.problem().integration.relative_tolerance;
-  return shift > kMaxIntegrationShift ? present * kAimedIntegrationShift / shift : present;
-}
-
 // Returns true when the noise or the control trajectories required a tighter tolerance, with which
 // the expansion has been made again.
 absl::StatusOr<bool> MixtureComponent::TightenTolerance(const Stop& stop) {
   if (!problem_.problem().tolerance_follows_noise) return false;
-  const double samples = std::max(kMinSamplesCounted, static_cast<double>(summary_.samples()));
-  const double needed =
-      kTolerancePerNoise * summary_.NoiseToSignal(expansion_->noise()) / std::sqrt(samples);
   const double present = problem_.problem().integration.relative_tolerance;
-  double tolerance = present;
-  // Half of the needed tolerance is taken, so that a slowly falling ratio does not cause frequent
-  // replays: four times as many samples come before the next.
-  if (needed < present) tolerance = 0.5 * needed;
-  const double shift = ShiftOfControls();
-  tolerance = std::max(kMinTolerance, std::min(tolerance, ToleranceForControls(shift)));
+  const double for_noise =
+      ToleranceForNoise(present, summary_.NoiseToSignal(expansion_->noise()), summary_.samples());
+  const double shift = ShiftOfControls(*expansion_, problem_.problem().regularization);
+  const double tolerance =
+      std::max(kMinTolerance, std::min(for_noise, ToleranceForControls(present, shift)));
   if (tolerance >= present || expansion_->StepsExactly()) {
     postponed_.tolerance = 0;
     return false;

@@ -165,8 +165,6 @@ class MixtureComponent {
   absl::StatusOr<std::unique_ptr<RegionalExpansion>> ReplayedWith(const LearnedNoise& noise,
                                                                   const Stop& stop);
   absl::StatusOr<bool> TightenTolerance(const Stop& stop);
-  double ShiftOfControls() const;
-  double ToleranceForControls(double shift) const;
   absl::StatusOr<std::unique_ptr<RegionalExpansion>> WithNewTolerance(double shift,
                                                                       const Stop& stop);
 
