@@ -57,6 +57,22 @@ bool IsGiven(const std::string& option, int argc, const char* const* argv) {
   });
 }
 
+// Returns what is wrong with the first word that looks like an option and is none; empty: there is
+// no such word.
+std::string UnknownOption(const CLI::App& app) {
+  std::vector<std::string> names;
+  for (const CLI::Option* const option : app.get_options()) names.push_back(option->get_name());
+  for (const std::string& word : app.remaining()) {
+    if (word.rfind("--", 0) != 0) continue;
+    const std::string wrong = word.substr(0, word.find('='));
+    const std::string nearest = NearestName(wrong, names);
+    return "there is no option \"" + wrong + "\"; " +
+           (nearest.empty() ? "polyestd --help lists the options"
+                            : "did you mean \"" + nearest + "\"?");
+  }
+  return "";
+}
+
 }  // namespace
 
 std::string EnvironmentVariable(const std::string& option) {
@@ -109,6 +125,8 @@ void AddConfiguration(CLI::App& app, const std::vector<std::string>& flags_only)
 
 std::string DescribeError(const CLI::App& app, const CLI::ParseError& error, int argc,
                           const char* const* argv) {
+  const std::string unknown = UnknownOption(app);
+  if (!unknown.empty()) return unknown;
   const std::string what = absl::StrReplaceAll(error.what(), {{"\n", " "}});
   std::string file;
   const CLI::Option* const config = app.get_config_ptr();

@@ -80,6 +80,13 @@ TEST_F(ConfigurationTest, NamesTheVariableThatIsWrong) {
   ExpectRefused({}, "POLYESTD_MAX_SESSIONS: ");
 }
 
+TEST_F(ConfigurationTest, NamesAnOptionThatIsMisspelledAndTheNearest) {
+  ExpectRefused({"--max-sesions", "5"},
+                "there is no option \"--max-sesions\"; did you mean \"--max-sessions\"?");
+  ExpectRefused({"--token-file=tokens"},
+                "there is no option \"--token-file\"; polyestd --help lists the options");
+}
+
 TEST_F(ConfigurationTest, NamesAVariableThatIsMisspelledAndTheNearest) {
   {
     const Variable variable("POLYESTD_MAX_SESIONS", "1");
